@@ -1,0 +1,3 @@
+"""Version of rotorfault."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,152 @@
+r"""ROISMC, the paper's robust optimal integral sliding mode controller: SDRE with an integral sliding surface.
+
+The law flown, per virtual acceleration input (equations (21)-(29), (31)-(35), signs as decoded in docs/paper.md):
+
+.. math:: u = a_{ref} - f_{ff} - R^{-1}g^TPe - (Hg)^{-1}H\hat\delta
+          - (Hg)^{-1}(k + \gamma_0\lVert Hg\rVert + \gamma_1\lVert Hg\rVert\lVert e\rVert)\,
+          \mathrm{sat}(\sigma/\phi)
+
+with sigma of `rotorfault.control.integral_sliding`, whose nominal dynamics are those of the SDRE loop. The
+disturbance estimate is zero here: lost thrust that the diagnosis has found is dealt with by allocation and enters
+sigma through the predicted acceleration. Feed-forward is added by `rotorfault.control.cascade`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from rotorfault.config import Strict
+from rotorfault.control.integral_sliding import (
+    Nominal,
+    Surface,
+    Switching,
+    SwitchingGains,
+    advance,
+    commit,
+    sliding_variable,
+    start,
+    switching_input,
+)
+from rotorfault.control.protocol import LawOutput, TrackingError
+from rotorfault.control.riccati import Gain
+from rotorfault.control.sdre import (
+    SdreParameters,
+    Three,
+    Weights,
+    attitude_gains,
+    initial_gain,
+    position_gains,
+    sdre_parameters,
+)
+from rotorfault.geometry import Mat3, Vec3
+from rotorfault.scalar import Scalar, sqrt
+from rotorfault.vehicle import Vehicle
+
+
+class SwitchingSettings(Strict):
+    """Switching input of one group of axes; the paper leaves k, gamma and the layer open."""
+
+    weight: Three = Field(description="n_i of H, dimensionless; the paper's six values, position or attitude part")
+    k: float = Field(ge=0.0, description="reaching gain [weight x m/s^2 or rad/s^2]")
+    gamma_0: float = Field(ge=0.0, description="bound on the disturbance [m/s^2 or rad/s^2]")
+    gamma_1: float = Field(0.0, ge=0.0, description="growth of that bound with the error norm [1/s^2]")
+    layer: float = Field(gt=0.0, description="half width of the boundary layer on sigma/n [m/s or rad/s]")
+
+    def gains(self) -> SwitchingGains:
+        """The numbers as a record."""
+        return SwitchingGains(Vec3.of(self.weight), self.k, self.gamma_0, self.gamma_1, self.layer)
+
+
+class RoismcSettings(Strict):
+    """Settings of the ROISMC law."""
+
+    weights: Weights = Field(Weights(), description="Q and R of (35)")
+    position: SwitchingSettings = Field(
+        SwitchingSettings(weight=(0.0349, 0.0423, 0.0265), k=0.01, gamma_0=2.0, layer=1.0),
+        description="switching input of x, y, z",
+    )
+    attitude: SwitchingSettings = Field(
+        SwitchingSettings(weight=(0.0234, 0.087, 0.0766), k=0.1, gamma_0=300.0, layer=15.0),
+        description="switching input of roll, pitch, yaw",
+    )
+    nominal: Nominal = Field("achieved", description="what the surface integrates: achieved | demanded")
+    switching: Switching = Field("smooth", description="smooth (sat) | discontinuous (sgn)")
+
+
+class RoismcParameters(NamedTuple):
+    """Numbers of the ROISMC law."""
+
+    sdre: SdreParameters
+    position: SwitchingGains
+    attitude: SwitchingGains
+
+
+class AttitudeMemory(NamedTuple):
+    """Riccati gain and sliding surface of the attitude axes."""
+
+    gain: Gain
+    surface: Surface
+
+
+class RoismcMemory(NamedTuple):
+    """Memory of the law."""
+
+    position: Surface
+    attitude: AttitudeMemory
+
+
+class Roismc:
+    """ROISMC of the paper: SDRE feedback plus integral sliding mode, no reaching phase."""
+
+    Settings = RoismcSettings
+
+    def __init__(self, settings: RoismcSettings) -> None:
+        self.settings = settings
+
+    def parameters(self, vehicle: Vehicle, period: float) -> RoismcParameters:
+        """Numbers of the law."""
+        s = self.settings
+        return RoismcParameters(sdre_parameters(s.weights), s.position.gains(), s.attitude.gains())
+
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: RoismcParameters) -> RoismcMemory:
+        """sigma(0) = 0 on all axes, guaranteed Riccati gain."""
+        return RoismcMemory(
+            position=start(position.rate),
+            attitude=AttitudeMemory(initial_gain(attitude.drift, parameters.sdre), start(attitude.rate)),
+        )
+
+    def _robust(
+        self, memory: Surface, error: TrackingError, nominal: Vec3, gains: SwitchingGains, dt: Scalar
+    ) -> tuple[Surface, Vec3, Vec3]:
+        """Add the switching input to a nominal feedback: (memory, u, sigma)."""
+        form = self.settings.nominal
+        surface = advance(memory, error.predicted, form)
+        sigma = sliding_variable(surface, error.rate, gains.weight)
+        switching = switching_input(
+            sigma, sqrt(error.e.dot(error.e) + error.e_dot.dot(error.e_dot)), gains, self.settings.switching
+        )
+        nominal_acceleration = error.drift @ error.rate + error.feed_forward + nominal
+        surface = commit(surface, nominal_acceleration, switching, error.actuator, form, dt)
+        return surface, nominal + switching, sigma
+
+    def position(
+        self, memory: Surface, error: TrackingError, parameters: RoismcParameters, dt: Scalar
+    ) -> tuple[Surface, LawOutput]:
+        """SDRE and switching input on x, y, z."""
+        k1, k2 = position_gains(error.e, parameters.sdre)
+        nominal = -k1.times(error.e) - k2.times(error.e_dot)
+        memory, u, sigma = self._robust(memory, error, nominal, parameters.position, dt)
+        return memory, LawOutput(u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
+
+    def attitude(
+        self, memory: AttitudeMemory, error: TrackingError, parameters: RoismcParameters, dt: Scalar
+    ) -> tuple[AttitudeMemory, LawOutput]:
+        """SDRE and switching input on roll, pitch, yaw."""
+        gain, K_angle, K_rate, residual, guarded = attitude_gains(
+            memory.gain, error.drift, parameters.sdre, self.settings.weights.newton_steps
+        )
+        nominal = -(K_angle @ error.e) - K_rate @ error.e_dot
+        surface, u, sigma = self._robust(memory.surface, error, nominal, parameters.attitude, dt)
+        return AttitudeMemory(gain, surface), LawOutput(u, sigma, K_angle, K_rate, residual, guarded)

@@ -1,0 +1,164 @@
+r"""SDRE control on the tracking error: u = -R^{-1} g^T P(x) e, equations (21), (22), (34), (35).
+
+The SDC form (34) is read as double integrators on six axes with one unit acceleration input each; the gyroscopic
+products of (3) are shared half and half between their two rates, giving the matrix `gyroscopic_drift` W(omega).
+The Riccati equation then falls apart into three scalar position axes, solved in closed form, and one 6x6 attitude
+block, solved by `rotorfault.control.riccati`.
+
+Weights (35), axes ordered (roll, x, pitch, y, yaw, z): on a position axis q1 = 0.3/|e|, q2 = 0.005 and
+r = 0.2 e^2 (0.4 e^2 for z). They vanish or blow up at e = 0, so |e| is floored and capped smoothly; the floor sets
+the bandwidth at the target, k1 = sqrt(1.5/floor^3), the cap the bandwidth far from it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from rotorfault.config import Strict
+from rotorfault.control.protocol import LawOutput, TrackingError
+from rotorfault.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain, position_gain
+from rotorfault.geometry import Mat3, Vec3, zeros
+from rotorfault.scalar import Scalar, sqrt
+from rotorfault.vehicle import Vehicle
+
+Three = tuple[float, float, float]
+Positive = Field(gt=0.0)
+
+
+class Weights(Strict):
+    """Weights of the quadratic cost, equation (35)."""
+
+    attitude_q_angle: Three = Field((1.0, 1.0, 1.0), description="Q on roll, pitch, yaw error [1/rad^2]")
+    attitude_q_rate: Three = Field((1.0, 1.0, 1.0), description="Q on their rates [s^2/rad^2]")
+    attitude_r: Three = Field((0.0088, 0.0088, 0.0088), description="R on angular acceleration [s^4/rad^2]")
+    position_q: Three = Field((0.3, 0.3, 0.3), description="numerator of Q on x, y, z error, q1 = value/|e| [1/m]")
+    position_q_rate: Three = Field((0.005, 0.005, 0.005), description="Q on velocity error [s^2/m^2]")
+    position_r: Three = Field((0.2, 0.2, 0.4), description="factor of R, r = value e^2 [s^4/m^4]")
+    error_floor: float = Field(0.1, gt=0.0, description="smooth floor of |e| in Q and R [m]")
+    error_cap: float = Field(1e6, gt=0.0, description="smooth cap of |e| in Q and R [m]")
+    newton_steps: int = Field(1, ge=1, le=20, description="Newton-Kleinman steps per sampling instant")
+
+
+class SdreParameters(NamedTuple):
+    """Numbers of the SDRE law."""
+
+    attitude_q_angle: Vec3
+    attitude_q_rate: Vec3
+    attitude_r: Vec3
+    position_q: Vec3
+    position_q_rate: Vec3
+    position_r: Vec3
+    error_floor: Scalar  # m
+    error_cap: Scalar  # m
+
+
+def sdre_parameters(weights: Weights) -> SdreParameters:
+    """Numbers of the weights as a record."""
+    return SdreParameters(
+        Vec3.of(weights.attitude_q_angle),
+        Vec3.of(weights.attitude_q_rate),
+        Vec3.of(weights.attitude_r),
+        Vec3.of(weights.position_q),
+        Vec3.of(weights.position_q_rate),
+        Vec3.of(weights.position_r),
+        weights.error_floor,
+        weights.error_cap,
+    )
+
+
+def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) -> Mat3:
+    """W(omega) of the SDC form in 1/s: omega_dot = W(omega) omega + J^{-1} tau, rows as in (3).
+
+    Each product of two rates is shared half and half between them; the rotor term is linear in one rate already.
+    """
+    J = vehicle.inertia
+    a1, a3, a5 = (J.y - J.z) / J.x, (J.z - J.x) / J.y, (J.x - J.y) / J.z
+    rotor = vehicle.rotor_inertia * residual_speed
+    p, q, r = omega_B * 0.5
+    return Mat3(
+        0.0, a1 * r - rotor / J.x, a1 * q,
+        a3 * r + rotor / J.y, 0.0, a3 * p,
+        a5 * q, a5 * p, 0.0,
+    )  # fmt: skip
+
+
+def error_magnitude(e: Scalar, floor: Scalar, cap: Scalar) -> Scalar:
+    """|e| floored and capped smoothly, in m."""
+    floored = sqrt(e * e + floor * floor)
+    return floored * cap / sqrt(floored * floored + cap * cap)
+
+
+def position_gains(e: Vec3, parameters: SdreParameters) -> tuple[Vec3, Vec3]:
+    """Gains (k1, k2) of u = -k1 e - k2 e_dot per position axis, in 1/s^2 and 1/s."""
+    gains = []
+    for e_i, q, q_rate, r in zip(
+        e, parameters.position_q, parameters.position_q_rate, parameters.position_r, strict=True
+    ):
+        size = error_magnitude(e_i, parameters.error_floor, parameters.error_cap)
+        gains.append(position_gain(q / size, q_rate, r * size * size))
+    return Vec3.of(k1 for k1, _ in gains), Vec3.of(k2 for _, k2 in gains)
+
+
+def attitude_gains(
+    stored: Gain, drift: Mat3, parameters: SdreParameters, steps: int
+) -> tuple[Gain, Mat3, Mat3, Scalar, Scalar]:
+    """Stored gain for the next step, (K_angle, K_rate) in 1/s^2 and 1/s, Riccati residual, guard indicator."""
+    problem = attitude_problem(
+        drift, Vec3(1.0, 1.0, 1.0), parameters.attitude_q_angle, parameters.attitude_q_rate, parameters.attitude_r
+    )
+    gain, residual, guarded = fly(problem, stored, steps)
+    K_angle, K_rate = feedback(problem, gain)
+    return gain, K_angle, K_rate, residual, guarded
+
+
+def initial_gain(drift: Mat3, parameters: SdreParameters) -> Gain:
+    """The guaranteed gain, stabilising for any drift: where the in-flight iteration starts."""
+    return guaranteed_gain(
+        attitude_problem(
+            drift, Vec3(1.0, 1.0, 1.0), parameters.attitude_q_angle, parameters.attitude_q_rate, parameters.attitude_r
+        )
+    )
+
+
+class SdreMemory(NamedTuple):
+    """Memory of the SDRE law."""
+
+    position: tuple[()]
+    attitude: Gain
+
+
+class Sdre:
+    """SDRE state feedback alone, equation (21): optimal weights, no sliding mode."""
+
+    Settings = Weights
+
+    def __init__(self, settings: Weights) -> None:
+        self.settings = settings
+
+    def parameters(self, vehicle: Vehicle, period: float) -> SdreParameters:
+        """Numbers of the law."""
+        return sdre_parameters(self.settings)
+
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: SdreParameters) -> SdreMemory:
+        """Start from the guaranteed gain."""
+        return SdreMemory(position=(), attitude=initial_gain(attitude.drift, parameters))
+
+    def position(
+        self, memory: tuple[()], error: TrackingError, parameters: SdreParameters, dt: Scalar
+    ) -> tuple[tuple[()], LawOutput]:
+        """u = -k1 e - k2 e_dot on x, y, z."""
+        k1, k2 = position_gains(error.e, parameters)
+        u = -k1.times(error.e) - k2.times(error.e_dot)
+        return memory, LawOutput(u, zeros(), Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
+
+    def attitude(
+        self, memory: Gain, error: TrackingError, parameters: SdreParameters, dt: Scalar
+    ) -> tuple[Gain, LawOutput]:
+        """u = -K_angle e - K_rate e_dot on roll, pitch, yaw."""
+        gain, K_angle, K_rate, residual, guarded = attitude_gains(
+            memory, error.drift, parameters, self.settings.newton_steps
+        )
+        u = -(K_angle @ error.e) - K_rate @ error.e_dot
+        return gain, LawOutput(u, zeros(), K_angle, K_rate, residual, guarded)

@@ -1,0 +1,311 @@
+"""Functions on scalars, whatever number type carries them.
+
+Every equation of rotorfault is written once, on scalars, with ``+ - * /`` and the functions of this module. This
+is the only file that knows which number types exist: Python floats, NumPy arrays, heyoka expressions and CasADi
+SX. A function looks at *all* its arguments to choose the type, so that floats and symbols may be mixed.
+
+Rules that every function keeps:
+
+- NaN in any argument gives NaN out (``select`` passes on the branch that it takes). A comparison with NaN is
+  false, so conditions are to be written such that NaN counts as *outside*.
+- A condition is a number, 1 where it holds and 0 where not; `both`, `either` and `negated` combine conditions.
+- ``sqrt`` of a negative float is NaN, not an exception: failure is data.
+
+heyoka and CasADi are never imported here: their expressions bring their module with them.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from types import ModuleType
+from typing import Any, TypeAlias
+
+import numpy as np
+
+Scalar: TypeAlias = Any
+"""A float, a NumPy array, a heyoka expression or a CasADi SX: whatever one engine computes with."""
+
+NAN = math.nan
+
+
+class _Floats:
+    """Python floats. ``math`` raises where IEEE arithmetic gives NaN or infinity; here it must not."""
+
+    @staticmethod
+    def sqrt(x: float) -> float:
+        return math.sqrt(x) if x >= 0.0 else NAN
+
+    @staticmethod
+    def exp(x: float) -> float:
+        return math.exp(x) if not x > 709.0 else math.inf
+
+    @staticmethod
+    def sin(x: float) -> float:
+        return math.sin(x) if abs(x) < math.inf else NAN
+
+    @staticmethod
+    def cos(x: float) -> float:
+        return math.cos(x) if abs(x) < math.inf else NAN
+
+    @staticmethod
+    def tan(x: float) -> float:
+        return math.tan(x) if abs(x) < math.inf else NAN
+
+    @staticmethod
+    def asin(x: float) -> float:
+        return math.asin(x) if -1.0 <= x <= 1.0 else NAN
+
+    atan2 = staticmethod(math.atan2)
+    tanh = staticmethod(math.tanh)
+
+    @staticmethod
+    def less(a: float, b: float) -> float:
+        return 1.0 if a < b else 0.0
+
+    @staticmethod
+    def less_equal(a: float, b: float) -> float:
+        return 1.0 if a <= b else 0.0
+
+    @staticmethod
+    def select(condition: float, a: float, b: float) -> float:
+        return a if condition else b
+
+
+class _Arrays:
+    """NumPy arrays, one element per flight."""
+
+    sqrt, exp, sin, cos, tan = np.sqrt, np.exp, np.sin, np.cos, np.tan
+    asin, atan2, tanh = np.arcsin, np.arctan2, np.tanh
+
+    @staticmethod
+    def less(a: Scalar, b: Scalar) -> Scalar:
+        return np.less(a, b).astype(float)
+
+    @staticmethod
+    def less_equal(a: Scalar, b: Scalar) -> Scalar:
+        return np.less_equal(a, b).astype(float)
+
+    @staticmethod
+    def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+        return np.where(condition, a, b)
+
+
+class _Heyoka:
+    """heyoka expressions. Its functions refuse plain floats and its comparisons are functions, not operators."""
+
+    def __init__(self, module: ModuleType) -> None:
+        self._expression = module.expression
+        self._lt, self._lte, self._select = module.lt, module.lte, module.select
+        self._atan2 = module.atan2
+        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "cos", "tan", "asin", "tanh")}
+        self._sqrt = module.sqrt
+
+    def __getattr__(self, name: str) -> Any:
+        # Plain one-argument functions need no adaptation: dispatch has seen that the argument is an expression.
+        return self._one_argument[name]
+
+    def sqrt(self, x: Scalar) -> Scalar:
+        return self._sqrt(x)
+
+    def _lift(self, x: Scalar) -> Scalar:
+        return x if isinstance(x, self._expression) else self._expression(float(x))
+
+    def atan2(self, y: Scalar, x: Scalar) -> Scalar:
+        return self._atan2(self._lift(y), self._lift(x))
+
+    def less(self, a: Scalar, b: Scalar) -> Scalar:
+        return self._lt(self._lift(a), self._lift(b))
+
+    def less_equal(self, a: Scalar, b: Scalar) -> Scalar:
+        return self._lte(self._lift(a), self._lift(b))
+
+    def select(self, condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+        if not isinstance(condition, self._expression):
+            return a if condition else b
+        return self._select(condition, self._lift(a), self._lift(b))
+
+
+class _Casadi:
+    """CasADi SX (or MX), for linearisation and C code."""
+
+    def __init__(self, module: ModuleType) -> None:
+        self._module = module
+        self.sqrt, self.exp, self.sin, self.cos = module.sqrt, module.exp, module.sin, module.cos
+        self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
+        self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
+
+
+_FLOATS, _ARRAYS = _Floats(), _Arrays()
+_BY_TYPE: dict[type, Any] = {
+    float: _FLOATS,
+    int: _FLOATS,
+    bool: _FLOATS,
+    np.float64: _FLOATS,
+    np.ndarray: _ARRAYS,
+}
+
+
+def _adopt(kind: type) -> Any:
+    """Find the functions for a number type seen for the first time; its own module is already imported."""
+    family = kind.__module__.partition(".")[0]
+    if family == "heyoka":
+        found: Any = _Heyoka(sys.modules["heyoka"])
+    elif family == "casadi":
+        found = _Casadi(sys.modules["casadi"])
+    elif issubclass(kind, (np.ndarray, np.generic)):
+        found = _ARRAYS if issubclass(kind, np.ndarray) else _FLOATS
+    else:
+        raise TypeError(f"{kind.__module__}.{kind.__qualname__} is no scalar that rotorfault computes with")
+    _BY_TYPE[kind] = found
+    return found
+
+
+def _of(*arguments: Scalar) -> Any:
+    """Choose the functions by all arguments: any array or symbol among them outranks the floats."""
+    for argument in arguments:
+        kind = type(argument)
+        functions = _BY_TYPE.get(kind) or _adopt(kind)
+        if functions is not _FLOATS:
+            return functions
+    return _FLOATS
+
+
+# --------------------------------------------------------------------------------------------- elementary functions
+
+
+def sqrt(x: Scalar) -> Scalar:
+    """Square root; NaN below zero."""
+    return _of(x).sqrt(x)
+
+
+def exp(x: Scalar) -> Scalar:
+    """Exponential function."""
+    return _of(x).exp(x)
+
+
+def sin(x: Scalar) -> Scalar:
+    """Sine of an angle in rad."""
+    return _of(x).sin(x)
+
+
+def cos(x: Scalar) -> Scalar:
+    """Cosine of an angle in rad."""
+    return _of(x).cos(x)
+
+
+def tan(x: Scalar) -> Scalar:
+    """Tangent of an angle in rad."""
+    return _of(x).tan(x)
+
+
+def asin(x: Scalar) -> Scalar:
+    """Inverse sine in rad; NaN outside [-1, 1]."""
+    return _of(x).asin(x)
+
+
+def atan2(y: Scalar, x: Scalar) -> Scalar:
+    """Angle of the point (x, y) in rad, in (-pi, pi]."""
+    return _of(y, x).atan2(y, x)
+
+
+def tanh(x: Scalar) -> Scalar:
+    """Hyperbolic tangent."""
+    return _of(x).tanh(x)
+
+
+# ------------------------------------------------------------------------------------------ conditions and selection
+
+
+def less(a: Scalar, b: Scalar) -> Scalar:
+    """1 where a < b, else 0; 0 where either is NaN."""
+    return _of(a, b).less(a, b)
+
+
+def less_equal(a: Scalar, b: Scalar) -> Scalar:
+    """1 where a <= b, else 0; 0 where either is NaN."""
+    return _of(a, b).less_equal(a, b)
+
+
+def greater(a: Scalar, b: Scalar) -> Scalar:
+    """1 where a > b, else 0; 0 where either is NaN."""
+    return less(b, a)
+
+
+def greater_equal(a: Scalar, b: Scalar) -> Scalar:
+    """1 where a >= b, else 0; 0 where either is NaN."""
+    return less_equal(b, a)
+
+
+def both(a: Scalar, b: Scalar) -> Scalar:
+    """Logical and of two conditions."""
+    return a * b
+
+
+def either(a: Scalar, b: Scalar) -> Scalar:
+    """Logical or of two conditions."""
+    return 1.0 - (1.0 - a) * (1.0 - b)
+
+
+def negated(a: Scalar) -> Scalar:
+    """Logical not of a condition."""
+    return 1.0 - a
+
+
+def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+    """`a` where the condition is 1, `b` where it is 0. Both are computed; only the taken one is passed on."""
+    return _of(condition, a, b).select(condition, a, b)
+
+
+# ---------------------------------------------------------------------------------------- derived: one source for all
+
+
+def minimum(a: Scalar, b: Scalar) -> Scalar:
+    """The smaller of two; NaN if either is NaN."""
+    f = _of(a, b)
+    return f.select(f.less(a, b), a, f.select(f.less_equal(b, a), b, a + b))
+
+
+def maximum(a: Scalar, b: Scalar) -> Scalar:
+    """The larger of two; NaN if either is NaN."""
+    f = _of(a, b)
+    return f.select(f.less(b, a), a, f.select(f.less_equal(a, b), b, a + b))
+
+
+def absolute(x: Scalar) -> Scalar:
+    """Magnitude."""
+    f = _of(x)
+    return f.select(f.less(x, 0.0), -x, x)
+
+
+def sign(x: Scalar) -> Scalar:
+    """-1, 0 or 1 with the sign of x; NaN for NaN."""
+    f = _of(x)
+    return f.select(f.less(0.0, x), 1.0, f.select(f.less(x, 0.0), -1.0, x))
+
+
+def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """x limited to [low, high]; NaN if any of the three is NaN."""
+    return minimum(maximum(x, low), high)
+
+
+def saturate(x: Scalar) -> Scalar:
+    """sat(x): x limited to [-1, 1], the boundary-layer function of sliding mode control."""
+    f = _of(x)
+    return f.select(f.less(x, -1.0), -1.0, f.select(f.less(1.0, x), 1.0, x))
+
+
+def square(x: Scalar) -> Scalar:
+    """x times x."""
+    return x * x
+
+
+def wrap_angle(x: Scalar) -> Scalar:
+    """The angle equal to x modulo a full turn, in (-pi, pi]."""
+    return atan2(sin(x), cos(x))
+
+
+def is_finite(x: Scalar) -> Scalar:
+    """1 where x is an ordinary number, 0 where it is NaN or infinite."""
+    f = _of(x)
+    return f.less_equal(x, sys.float_info.max) * f.less_equal(-sys.float_info.max, x)
