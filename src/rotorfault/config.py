@@ -18,6 +18,9 @@ from rotorfault.errors import InputError
 
 M = TypeVar("M", bound=BaseModel)
 
+Three = tuple[float, float, float]
+"""Three numbers, one per axis."""
+
 # Marks the errors that say what came by themselves, so that `explain` does not say it twice.
 _OWN = "rotorfault"
 

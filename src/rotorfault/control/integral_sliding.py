@@ -26,11 +26,43 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from pydantic import Field, field_validator
+
+from rotorfault.config import Strict, Three
+from rotorfault.control.protocol import TrackingError
 from rotorfault.geometry import Vec3, zeros
-from rotorfault.scalar import Scalar, absolute, exp, saturate, sign
+from rotorfault.scalar import Scalar, absolute, exp, saturate, sign, sqrt
 
 Nominal = Literal["achieved", "demanded"]
 Switching = Literal["smooth", "discontinuous"]
+
+
+class SwitchingSettings(Strict):
+    """Switching input of one group of axes; the paper leaves k, gamma and the layer open."""
+
+    weight: Three = Field(description="n_i of H, dimensionless, any sign but not 0")
+    k: Three = Field(description="reaching gain per axis [weight x m/s^2 or rad/s^2]")
+    gamma_0: float = Field(ge=0.0, description="bound on the disturbance [m/s^2 or rad/s^2]")
+    gamma_1: float = Field(default=0.0, ge=0.0, description="growth of that bound with the error norm [1/s^2]")
+    layer: float = Field(gt=0.0, description="half width of the boundary layer on sigma/n [m/s or rad/s]")
+
+    @field_validator("weight")
+    @classmethod
+    def _not_zero(cls, weight: Three) -> Three:
+        if 0.0 in weight:
+            raise ValueError("weights must differ from 0: H g would be singular")
+        return weight
+
+    @field_validator("k")
+    @classmethod
+    def _not_negative(cls, k: Three) -> Three:
+        if min(k) < 0.0:
+            raise ValueError("reaching gains must be 0 or greater: V would grow")
+        return k
+
+    def gains(self) -> SwitchingGains:
+        """The numbers as a record."""
+        return SwitchingGains(Vec3.of(self.weight), Vec3.of(self.k), self.gamma_0, self.gamma_1, self.layer)
 
 
 class Surface(NamedTuple):
@@ -45,7 +77,7 @@ class SwitchingGains(NamedTuple):
     """Gains of the switching input of three axes."""
 
     weight: Vec3  # n_i, dimensionless, any sign but not zero
-    k: Scalar  # weight times m/s^2 or rad/s^2
+    k: Vec3  # weight times m/s^2 or rad/s^2
     gamma_0: Scalar  # m/s^2 or rad/s^2: bound on the disturbance
     gamma_1: Scalar  # 1/s^2: growth of that bound with the error
     layer: Scalar  # m/s or rad/s: half width of the boundary layer on sigma_i / |n_i|
@@ -87,9 +119,40 @@ def commit(
 def switching_input(sigma: Vec3, error_norm: Scalar, gains: SwitchingGains, form: Switching) -> Vec3:
     """The robust part of the law, opposed to sigma; `discontinuous` takes sgn in place of sat."""
 
-    def axis(sigma_i: Scalar, n: Scalar) -> Scalar:
+    def axis(sigma_i: Scalar, n: Scalar, k: Scalar) -> Scalar:
         size = absolute(n)
-        reach = (gains.k + (gains.gamma_0 + gains.gamma_1 * error_norm) * size) / n
+        reach = (k + (gains.gamma_0 + gains.gamma_1 * error_norm) * size) / n
         return -reach * (sign(sigma_i) if form == "discontinuous" else saturate(sigma_i / (size * gains.layer)))
 
-    return Vec3.of(axis(s, n) for s, n in zip(sigma, gains.weight, strict=True))
+    return Vec3.of(axis(s, n, k) for s, n, k in zip(sigma, gains.weight, gains.k, strict=True))
+
+
+def add_switching(
+    memory: Surface,
+    error: TrackingError,
+    feedback: Vec3,
+    gains: SwitchingGains,
+    nominal: Nominal,
+    form: Switching,
+    dt: Scalar,
+) -> tuple[Surface, Vec3, Vec3]:
+    """Make a nominal feedback robust: advance the surface, add the switching input.
+
+    Parameters
+    ----------
+    feedback : Vec3
+        Virtual accelerations of the nominal law in m/s^2 or rad/s^2, without feed-forward.
+
+    Returns
+    -------
+    memory : Surface
+    u : Vec3
+        Feedback plus switching input, in m/s^2 or rad/s^2.
+    sigma : Vec3
+        The sliding variable (23), unit of the rate times the weight.
+    """
+    surface = advance(memory, error.predicted, nominal)
+    sigma = sliding_variable(surface, error.rate, gains.weight)
+    switching = switching_input(sigma, sqrt(error.e.dot(error.e) + error.e_dot.dot(error.e_dot)), gains, form)
+    nominal_acceleration = error.drift @ error.rate + error.feed_forward + feedback
+    return commit(surface, nominal_acceleration, switching, error.actuator, nominal, dt), feedback + switching, sigma

@@ -23,40 +23,23 @@ from rotorfault.control.integral_sliding import (
     Surface,
     Switching,
     SwitchingGains,
-    advance,
-    commit,
-    sliding_variable,
+    SwitchingSettings,
+    add_switching,
     start,
-    switching_input,
 )
 from rotorfault.control.protocol import LawOutput, TrackingError
 from rotorfault.control.riccati import Gain
 from rotorfault.control.sdre import (
     SdreParameters,
-    Three,
     Weights,
     attitude_gains,
     initial_gain,
     position_gains,
     sdre_parameters,
 )
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.scalar import Scalar, sqrt
+from rotorfault.geometry import Mat3
+from rotorfault.scalar import Scalar
 from rotorfault.vehicle import Vehicle
-
-
-class SwitchingSettings(Strict):
-    """Switching input of one group of axes; the paper leaves k, gamma and the layer open."""
-
-    weight: Three = Field(description="n_i of H, dimensionless; the paper's six values, position or attitude part")
-    k: float = Field(ge=0.0, description="reaching gain [weight x m/s^2 or rad/s^2]")
-    gamma_0: float = Field(ge=0.0, description="bound on the disturbance [m/s^2 or rad/s^2]")
-    gamma_1: float = Field(0.0, ge=0.0, description="growth of that bound with the error norm [1/s^2]")
-    layer: float = Field(gt=0.0, description="half width of the boundary layer on sigma/n [m/s or rad/s]")
-
-    def gains(self) -> SwitchingGains:
-        """The numbers as a record."""
-        return SwitchingGains(Vec3.of(self.weight), self.k, self.gamma_0, self.gamma_1, self.layer)
 
 
 class RoismcSettings(Strict):
@@ -64,11 +47,11 @@ class RoismcSettings(Strict):
 
     weights: Weights = Field(Weights(), description="Q and R of (35)")
     position: SwitchingSettings = Field(
-        SwitchingSettings(weight=(0.0349, 0.0423, 0.0265), k=0.01, gamma_0=2.0, layer=1.0),
+        SwitchingSettings(weight=(0.0349, 0.0423, 0.0265), k=(0.01, 0.01, 0.01), gamma_0=2.0, layer=1.0),
         description="switching input of x, y, z",
     )
     attitude: SwitchingSettings = Field(
-        SwitchingSettings(weight=(0.0234, 0.087, 0.0766), k=0.1, gamma_0=300.0, layer=15.0),
+        SwitchingSettings(weight=(0.0234, 0.087, 0.0766), k=(0.1, 0.1, 0.1), gamma_0=300.0, layer=15.0),
         description="switching input of roll, pitch, yaw",
     )
     nominal: Nominal = Field("achieved", description="what the surface integrates: achieved | demanded")
@@ -117,36 +100,26 @@ class Roismc:
             attitude=AttitudeMemory(initial_gain(attitude.drift, parameters.sdre), start(attitude.rate)),
         )
 
-    def _robust(
-        self, memory: Surface, error: TrackingError, nominal: Vec3, gains: SwitchingGains, dt: Scalar
-    ) -> tuple[Surface, Vec3, Vec3]:
-        """Add the switching input to a nominal feedback: (memory, u, sigma)."""
-        form = self.settings.nominal
-        surface = advance(memory, error.predicted, form)
-        sigma = sliding_variable(surface, error.rate, gains.weight)
-        switching = switching_input(
-            sigma, sqrt(error.e.dot(error.e) + error.e_dot.dot(error.e_dot)), gains, self.settings.switching
-        )
-        nominal_acceleration = error.drift @ error.rate + error.feed_forward + nominal
-        surface = commit(surface, nominal_acceleration, switching, error.actuator, form, dt)
-        return surface, nominal + switching, sigma
-
     def position(
         self, memory: Surface, error: TrackingError, parameters: RoismcParameters, dt: Scalar
     ) -> tuple[Surface, LawOutput]:
         """SDRE and switching input on x, y, z."""
         k1, k2 = position_gains(error.e, parameters.sdre)
         nominal = -k1.times(error.e) - k2.times(error.e_dot)
-        memory, u, sigma = self._robust(memory, error, nominal, parameters.position, dt)
+        s = self.settings
+        memory, u, sigma = add_switching(memory, error, nominal, parameters.position, s.nominal, s.switching, dt)
         return memory, LawOutput(u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
 
     def attitude(
         self, memory: AttitudeMemory, error: TrackingError, parameters: RoismcParameters, dt: Scalar
     ) -> tuple[AttitudeMemory, LawOutput]:
         """SDRE and switching input on roll, pitch, yaw."""
+        s = self.settings
         gain, K_angle, K_rate, residual, guarded = attitude_gains(
-            memory.gain, error.drift, parameters.sdre, self.settings.weights.newton_steps
+            memory.gain, error.drift, parameters.sdre, s.weights.newton_steps
         )
         nominal = -(K_angle @ error.e) - K_rate @ error.e_dot
-        surface, u, sigma = self._robust(memory.surface, error, nominal, parameters.attitude, dt)
+        surface, u, sigma = add_switching(
+            memory.surface, error, nominal, parameters.attitude, s.nominal, s.switching, dt
+        )
         return AttitudeMemory(gain, surface), LawOutput(u, sigma, K_angle, K_rate, residual, guarded)

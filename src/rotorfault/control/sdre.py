@@ -16,15 +16,13 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from rotorfault.config import Strict
+from rotorfault.config import Strict, Three
 from rotorfault.control.protocol import LawOutput, TrackingError
 from rotorfault.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain, position_gain
 from rotorfault.geometry import Mat3, Vec3, zeros
 from rotorfault.scalar import Scalar, sqrt
 from rotorfault.vehicle import Vehicle
 
-Three = tuple[float, float, float]
-Positive = Field(gt=0.0)
 
 
 class Weights(Strict):

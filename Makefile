@@ -1,0 +1,67 @@
+# Targets of rotorfault; `make` alone lists them. Everything is installed into virtual environments in this folder.
+
+PYTHON ?= python3
+PIP := .venv/bin/python -m pip --disable-pip-version-check
+NUMPY_PIP := .venv-numpy/bin/python -m pip --disable-pip-version-check
+CASE := results/paper-set-point
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help venv paper test test-numpy lint types benchmarks clean check-python
+
+help: ## List the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+check-python:
+	@command -v $(PYTHON) >/dev/null || { \
+	  echo "No '$(PYTHON)' found. Install Python 3.11 or newer, or name one: make PYTHON=/path/to/python3.12 ..." >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "rotorfault needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) --version 2>&1)." >&2; \
+	  echo "Name a newer one: make PYTHON=/path/to/python3.12 ..." >&2; exit 1; }
+
+# Two stamps: flying the paper's case needs rotorfault alone, working on it needs the tools too.
+.venv/.stamp-fly: pyproject.toml constraints.txt | check-python
+	$(PYTHON) -m venv .venv
+	$(PIP) install --quiet -c constraints.txt -e .
+	@touch $@
+
+.venv/.stamp-develop: .venv/.stamp-fly
+	$(PIP) install --quiet -c constraints.txt -e '.[test,dev,flightcode]'
+	@touch $@
+
+# Without heyoka, as on systems that it has no wheels for. --no-deps, for rotorfault itself asks for it on Linux.
+.venv-numpy/.stamp: pyproject.toml constraints.txt | check-python
+	$(PYTHON) -m venv .venv-numpy
+	grep -v '^heyoka' constraints.txt > .venv-numpy/requirements.txt
+	$(NUMPY_PIP) install --quiet -r .venv-numpy/requirements.txt
+	$(NUMPY_PIP) install --quiet --no-deps -e .
+	@touch $@
+
+venv: .venv/.stamp-develop ## Create .venv with rotorfault, the tests' and the developers' tools
+
+paper: .venv/.stamp-fly ## Fly the paper's set-point case under SMC and ROISMC and compare them
+	.venv/bin/rotorfault fly paper-set-point --controller smc --out $(CASE)/smc
+	.venv/bin/rotorfault fly paper-set-point --controller roismc --out $(CASE)/roismc
+	.venv/bin/rotorfault compare $(CASE)/smc/flight.nc $(CASE)/roismc/flight.nc --out $(CASE)/compare
+
+test: .venv/.stamp-develop ## Run the tests
+	.venv/bin/python -m pytest -n 2
+
+test-numpy: .venv-numpy/.stamp ## Run the tests without heyoka, in .venv-numpy
+	.venv-numpy/bin/python -m pytest -n 2
+
+lint: .venv/.stamp-develop ## Check style with ruff
+	.venv/bin/ruff check
+
+types: .venv/.stamp-develop ## Check types with mypy
+	.venv/bin/mypy
+
+benchmarks: .venv/.stamp-develop ## Run every script in benchmarks/
+	@for script in benchmarks/*.py; do \
+	  [ -e "$$script" ] || { echo "There are no benchmarks yet."; break; }; \
+	  echo "$$script"; .venv/bin/python "$$script" || exit 1; \
+	done
+
+clean: ## Remove what tools made; keeps the virtual environments and results
+	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,160 @@
+"""The closed loop, one sampling period: the only place where truth and belief meet.
+
+    truth       = plant.observe(state)
+    measurement = sensors(truth)
+    command     = autopilot(measurement, reference)
+    state       = plant.step(state, command held for one period)
+
+Time is the counted step times the period, never a sum of periods: a fault at 1.8 s falls on its step exactly.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, final
+
+from rotorfault.autopilot import Autopilot, AutopilotMemory, AutopilotParameters, AutopilotReport
+from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
+from rotorfault.plant.rotors import true_loss
+from rotorfault.plant.sensors import Normals, Sensors, no_noise
+from rotorfault.scalar import Scalar
+from rotorfault.signals import Command, Reference
+from rotorfault.telemetry import Signals
+from rotorfault.vehicle import hover_thrust
+
+
+class LoopParameters(NamedTuple):
+    """All numbers of a closed loop."""
+
+    plant: PlantParameters
+    autopilot: AutopilotParameters
+    sensors: Any
+    period: Scalar  # s
+
+
+class LoopState(NamedTuple):
+    """State of truth and belief, and the number of steps flown."""
+
+    plant: PlantState
+    autopilot: AutopilotMemory
+    steps: Scalar
+
+
+class Drive(NamedTuple):
+    """What enters from outside at each step."""
+
+    reference: Reference
+    noise: Normals
+
+
+class Start(NamedTuple):
+    """Where a flight begins."""
+
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    attitude: Vec3  # rad
+    omega_B: Vec3  # rad/s
+
+
+@final
+class ClosedLoop:
+    """Plant, sensors and autopilot.
+
+    Parameters
+    ----------
+    plant : Plant
+    sensors : Sensors
+    autopilot : Autopilot
+    """
+
+    def __init__(self, plant: Plant, sensors: Sensors, autopilot: Autopilot) -> None:
+        self.plant, self.sensors, self.autopilot = plant, sensors, autopilot
+
+    def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
+        """State before the first step; rotors at the hover thrust that the autopilot believes in."""
+        plant = self.plant.initial(
+            *start, hover_thrust(parameters.autopilot.vehicle), parameters.plant
+        )
+        truth = self.plant.observe(plant, 0.0, parameters.plant)
+        measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
+        return LoopState(
+            plant, self.autopilot.initial(measurement, drive.reference, parameters.autopilot), 0.0
+        )
+
+    def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
+        """One sampling period: the state after it, and the signals at its beginning."""
+        time = state.steps * parameters.period
+        truth = self.plant.observe(state.plant, time, parameters.plant)
+        measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
+        memory, command, report = self.autopilot.step(
+            state.autopilot,
+            measurement,
+            drive.reference,
+            self._told(state.plant, time, parameters.plant),
+            parameters.autopilot,
+            parameters.period,
+        )
+        plant = self.plant.step(state.plant, command, time, parameters.plant, parameters.period)
+        return LoopState(plant, memory, state.steps + 1.0), signals(truth, drive.reference, command, report)
+
+    def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
+        """The true losses, for a diagnosis source that is an oracle; nothing for any other."""
+        delay = self.autopilot.diagnoser.oracle_delay
+        if delay is None:
+            return PerRotor.all(0.0)
+        return true_loss(parameters.vehicle, plant.rotors, self.plant.fault(time - delay, parameters))
+
+
+def signals(truth: Truth, reference: Reference, command: Command, report: AutopilotReport) -> Signals:
+    """What is recorded of one sampling instant."""
+    seen, told, law = truth.measurement, report.diagnosis, report.control
+    left = report.allocation.unallocated
+    return Signals(
+        position=seen.p_W,
+        velocity=seen.v_W,
+        attitude=seen.attitude,
+        body_rates=seen.omega_B,
+        position_reference=reference.p_W,
+        velocity_reference=reference.v_W,
+        acceleration_reference=reference.a_W,
+        yaw_reference=reference.yaw,
+        attitude_demand=law.attitude_demand,
+        attitude_command=law.attitude_command,
+        wind=truth.air.velocity_W,
+        disturbance=truth.air.acceleration_W,
+        thrust_command=command.thrust,
+        thrust=truth.thrust,
+        expected_thrust=report.expected_thrust,
+        rotor_speed=truth.rotor_speed,
+        loss_true=truth.loss,
+        loss_estimated=told.estimate,
+        loss_believed=told.loss,
+        fault_flag=told.flagged,
+        thrust_residual=told.residual,
+        thrust_demand=report.wrench.thrust,
+        torque_demand=report.wrench.torque_B,
+        thrust_unallocated=left.thrust,
+        torque_unallocated=left.torque_B,
+        given_up=report.allocation.given_up,
+        virtual_position=law.virtual_position_W,
+        virtual_attitude=law.virtual_attitude,
+        sigma_position=law.sigma_position,
+        sigma_attitude=law.sigma_attitude,
+        lyapunov=law.lyapunov,
+        gain_position=law.gain_position,
+        gain_velocity=law.gain_velocity,
+        gain_angle=law.gain_angle,
+        gain_rate=law.gain_rate,
+        riccati_residual=law.riccati_residual,
+        riccati_guarded=law.riccati_guarded,
+    )
+
+
+def quiet(reference: Reference) -> Drive:
+    """A drive without noise."""
+    return Drive(reference, no_noise())
+
+
+def level_start(p_W: Vec3) -> Start:
+    """At rest and level."""
+    return Start(p_W, zeros(), zeros(), zeros())

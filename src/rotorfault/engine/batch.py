@@ -1,0 +1,118 @@
+"""What an engine is given and what it gives back: a batch of flights of one closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.plant.sensors import no_noise
+from rotorfault.records import flatten, unflatten
+from rotorfault.signals import Reference
+
+Array = NDArray[np.float64]
+CHUNK = 500  # steps between two looks at progress, noise and early endings
+
+
+class Batch(NamedTuple):
+    """N flights of one closed loop, all of the same length."""
+
+    loop: ClosedLoop
+    state: LoopState  # leaves are floats, or arrays (N,)
+    parameters: LoopParameters  # leaves are floats, or arrays (N,)
+    reference: Array  # (steps, 12): rows of `Reference`, shared by all flights
+    count: int  # N
+    seeds: tuple[tuple[int, int], ...]  # (seed, flight index) per flight: names its random numbers
+    every: int = 1  # record each so many steps
+
+    @property
+    def steps(self) -> int:
+        """Number of sampling periods."""
+        return len(self.reference)
+
+
+class Recording(NamedTuple):
+    """Signals of a batch; a flight that was cut short has fewer records."""
+
+    signals: Array  # (records, rows of `Signals`, N)
+    steps: Array  # (records,): number of the step at which each record was taken
+    interrupted: bool = False
+
+
+Watch = Callable[[int, Array], bool]
+"""Called after each chunk with the steps done and the records so far; returns True to end the batch early."""
+
+
+class Engine(Protocol):
+    """Runs batches on one number type."""
+
+    def __call__(self, batch: Batch, watch: Watch) -> Recording:
+        """Fly a batch."""
+
+
+def no_watch(done: int, records: Array) -> bool:
+    """Never ends a batch early."""
+    return False
+
+
+class Noise:
+    """Standard normal numbers of each flight, the same whatever batch it flies in.
+
+    A counter-based generator (Philox) per flight, keyed by (seed, flight index); numbers are drawn in order of
+    steps, twelve a step.
+    """
+
+    def __init__(self, seeds: tuple[tuple[int, int], ...]) -> None:
+        self._generators = [np.random.Generator(np.random.Philox(np.random.SeedSequence(s))) for s in seeds]
+
+    def draw(self, steps: int) -> Array:
+        """Numbers of the next steps, shape (steps, 12, N)."""
+        return np.stack([g.standard_normal((steps, 12)) for g in self._generators], axis=2)
+
+
+def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
+    """First step and rows of the drive, chunk by chunk.
+
+    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, 24, N) with it.
+    """
+    noise = Noise(batch.seeds) if batch.loop.sensors.needs_noise else None
+    for first in range(0, batch.steps, CHUNK):
+        reference = batch.reference[first : first + CHUNK, :, None]
+        if noise is None:
+            yield first, reference
+        else:
+            shared = np.broadcast_to(reference, (*reference.shape[:2], batch.count))
+            yield first, np.concatenate([shared, noise.draw(len(reference))], axis=1)
+
+
+def drive_template(batch: Batch) -> Drive | Reference:
+    """A record of the shape that the rows of `drive_rows` flatten."""
+    reference: Reference = unflatten(_REFERENCE, [0.0] * 12)
+    return Drive(reference, no_noise()) if batch.loop.sensors.needs_noise else reference
+
+
+def as_drive(record: Any) -> Drive:
+    """The drive that a record of the shape of `drive_template` stands for."""
+    return record if isinstance(record, Drive) else Drive(record, no_noise())
+
+
+def columns(record: Any, count: int) -> Array:
+    """Leaves of a record as rows of an array (leaves, N); floats are repeated."""
+    return np.stack([np.broadcast_to(np.asarray(leaf, dtype=float), (count,)) for leaf in flatten(record)])
+
+
+def recorded(batch: Batch, first: int, length: int) -> list[int]:
+    """Which steps of a chunk are to be recorded, counted from its first."""
+    return [k for k in range(length) if (first + k) % batch.every == 0]
+
+
+def _reference_template() -> Reference:
+    from_names = {name: 0.0 for name in ("yaw", "yaw_rate", "yaw_acceleration")}
+    zero = no_noise().position
+    return Reference(p_W=zero, v_W=zero, a_W=zero, **from_names)
+
+
+_REFERENCE = _reference_template()

@@ -1,0 +1,120 @@
+"""Compiled loops, kept in the process and on disk so that each is compiled once on a machine.
+
+The key names everything that the compiled code depends on: the source of this package, the compiler's version, the
+processor, and the structure of the loop (classes and settings of its parts). A part from outside the package adds
+the source of its own module; where that cannot be read, the loop is kept in the process only.
+
+On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
+off). A file that cannot be read is compiled anew and replaced.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+import pickle
+import platform
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rotorfault.closed_loop import ClosedLoop
+from rotorfault.files import write_atomically
+
+_KEPT: dict[str, Any] = {}
+
+
+class Key(NamedTuple):
+    """Name of a compiled loop, and whether it may go to disk."""
+
+    digest: str
+    lasting: bool
+
+
+def key(loop: ClosedLoop, compiler: str) -> Key:
+    """Name of the compiled form of a loop."""
+    plant, autopilot = loop.plant, loop.autopilot
+    parts = [plant.model, plant.wind, *plant.faults, loop.sensors]
+    parts += [autopilot.diagnoser, autopilot.controller, autopilot.allocator]
+    lasting = True
+    words = [_package_digest(), compiler, platform.machine(), platform.processor(), str(plant.substeps)]
+    for part in parts:
+        words.append(describe(part))
+        if not type(part).__module__.startswith("rotorfault."):
+            source = _source(part)
+            lasting = lasting and source is not None
+            # Without source, only this very object can be known to be the same again.
+            words.append(source if source is not None else str(id(part)))
+    return Key(hashlib.sha256("\n".join(words).encode()).hexdigest(), lasting)
+
+
+def describe(part: Any) -> str:
+    """Class and settings of a part and of the parts in it."""
+    inside = [f"{name}={describe(value)}" for name, value in sorted(getattr(part, "__dict__", {}).items())]
+    kind = f"{type(part).__module__}.{type(part).__qualname__}"
+    if isinstance(part, (str, int, float, bool, type(None), tuple, list, dict)):
+        return repr(part)
+    if hasattr(type(part), "model_dump"):
+        return f"{kind}({part!r})"
+    return f"{kind}({', '.join(inside)})"
+
+
+def get(name: Key, make: Callable[[], Any]) -> Any:
+    """The compiled loop of this name, made if there is none."""
+    if name.digest not in _KEPT:
+        path = _path(name)
+        found = _load(path)
+        if found is None:
+            found = make()
+            _store(path, found)
+        _KEPT[name.digest] = found
+    return _KEPT[name.digest]
+
+
+def _path(name: Key) -> Path | None:
+    folder = os.environ.get("ROTORFAULT_CACHE")
+    if not name.lasting or folder == "":
+        return None
+    if folder is None:
+        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+        folder = str(Path(base) / "rotorfault")
+    return Path(folder) / f"{name.digest}.loop"
+
+
+def _load(path: Path | None) -> Any:
+    if path is None:
+        return None
+    try:
+        return pickle.loads(path.read_bytes())
+    except Exception:
+        # Missing, truncated, or of another heyoka: whatever it is, the loop can be compiled anew.
+        return None
+
+
+def _store(path: Path | None, made: Any) -> None:
+    if path is None:
+        return
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, lambda temporary: temporary.write_bytes(pickle.dumps(made)))
+    except OSError:
+        return  # a cache that cannot be written costs a second next time, nothing else
+
+
+@lru_cache(maxsize=1)
+def _package_digest() -> str:
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _source(part: Any) -> str | None:
+    try:
+        module = inspect.getmodule(type(part))
+        return None if module is None else inspect.getsource(module)
+    except (OSError, TypeError):
+        return None

@@ -1,0 +1,58 @@
+"""Engine on Python floats: one flight after the other, any controller, nothing to compile."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorfault.engine.batch import (
+    Array,
+    Batch,
+    Recording,
+    Watch,
+    as_drive,
+    columns,
+    drive_rows,
+    drive_template,
+    recorded,
+)
+from rotorfault.records import flatten, unflatten
+from rotorfault.telemetry import SIGNAL_NAMES, Signals
+
+
+def run(batch: Batch, watch: Watch) -> Recording:
+    """Fly a batch on Python floats; see `rotorfault.engine.batch.Engine`.
+
+    Where float arithmetic raises (division by zero, overflow) the flight goes on as NaN, as in the other engines.
+    """
+    template = drive_template(batch)
+    numbers, starts = columns(batch.parameters, batch.count), columns(batch.state, batch.count)
+    parameters = [unflatten(batch.parameters, numbers[:, i].tolist()) for i in range(batch.count)]
+    states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.count)]
+    lost = [False] * batch.count
+    missing = [np.nan] * len(SIGNAL_NAMES)
+    records: list[Array] = []
+    steps: list[int] = []
+    try:
+        for first, rows in drive_rows(batch):
+            wanted = set(recorded(batch, first, len(rows)))
+            for k, row in enumerate(rows):
+                taken: list[list[float]] = []
+                for i in range(batch.count):
+                    drive = as_drive(unflatten(template, row[:, min(i, row.shape[1] - 1)].tolist()))
+                    signals: Signals | None = None
+                    if not lost[i]:
+                        try:
+                            states[i], signals = batch.loop.step(states[i], drive, parameters[i])
+                        except (ZeroDivisionError, OverflowError):
+                            lost[i] = True
+                    if k in wanted:
+                        taken.append(missing if signals is None else [float(x) for x in flatten(signals)])
+                if k in wanted:
+                    records.append(np.array(taken).T)
+                    steps.append(first + k)
+            if watch(first + len(rows), np.stack(records)):
+                break
+    except KeyboardInterrupt:
+        return Recording(np.stack(records), np.array(steps, dtype=float), interrupted=True)
+    return Recording(np.stack(records), np.array(steps, dtype=float))
+

@@ -1,0 +1,51 @@
+r"""The classical fourth-order Runge-Kutta step, on records.
+
+.. math:: x_{n+1} = x_n + \frac{h}{6}(k_1 + 2k_2 + 2k_3 + k_4)
+
+Source: W. Kutta, "Beitrag zur näherungsweisen Integration totaler Differentialgleichungen", 1901. A fixed step, so
+that every engine runs the same sequence of operations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from rotorfault.records import flatten, unflatten
+from rotorfault.scalar import Scalar
+
+R = TypeVar("R")
+
+# Multiplied, not divided: heyoka turns a division by a number into this, and then all engines round alike.
+_SIXTH = 1.0 / 6.0
+
+
+def rk4(derivative: Callable[[R], R], state: R, dt: Scalar) -> R:
+    """State after one step.
+
+    Parameters
+    ----------
+    derivative : callable
+        Gives the time derivative of a state as a record of the same shape. A system that depends on time carries
+        time in its state, with derivative 1.
+    state : record
+    dt : scalar, s
+        Step size.
+
+    Returns
+    -------
+    record
+        Of the shape of `state`; the local error is of order dt^5.
+    """
+    half, sixth = 0.5 * dt, _SIXTH * dt
+    x = flatten(state)
+
+    def ahead(k: list[Scalar], h: Scalar) -> R:
+        return unflatten(state, [a + h * b for a, b in zip(x, k, strict=True)])
+
+    k1 = flatten(derivative(state))
+    k2 = flatten(derivative(ahead(k1, half)))
+    k3 = flatten(derivative(ahead(k2, half)))
+    k4 = flatten(derivative(ahead(k3, dt)))
+    slopes = [a + 2.0 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    return ahead(slopes, sixth)

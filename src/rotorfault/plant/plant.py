@@ -1,0 +1,172 @@
+"""The truth: body, rotors, wind and faults together, one sampling period at a time.
+
+The command is held over the period. The rotor lag is part of the integrated state. Wind is taken at the stage
+times of the integrator; faults once at the start of each sub-step, so that one that sets in on a sub-step's
+boundary acts exactly from there on and never costs the integrator its order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, final
+
+from rotorfault.errors import InputError
+from rotorfault.geometry import PerRotor, Vec3
+from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
+from rotorfault.plant.integrator import rk4
+from rotorfault.plant.models import BodyModel
+from rotorfault.plant.rotors import (
+    delivered_thrust,
+    lag_derivative,
+    limited_command,
+    true_loss,
+    true_rotor_speeds,
+)
+from rotorfault.plant.wind import Air, Wind
+from rotorfault.scalar import Scalar
+from rotorfault.signals import Command, Measurement
+from rotorfault.vehicle import Vehicle, residual_speed, wrench_of
+
+
+class PlantParameters(NamedTuple):
+    """All numbers of the truth."""
+
+    vehicle: Vehicle
+    wind: Any  # record of the wind
+    faults: tuple[Any, ...]  # one record per fault
+
+
+class PlantState(NamedTuple):
+    """State of the truth."""
+
+    body: Any  # record of the body model
+    rotors: PerRotor  # N, lag outputs v of (8)
+
+
+class Truth(NamedTuple):
+    """What is really so at a sampling instant; only records and sensors may look at it."""
+
+    measurement: Measurement  # as perfect sensors would give it
+    thrust: PerRotor  # N, delivered
+    rotor_speed: PerRotor  # rad/s, without sign
+    loss: PerRotor  # 0 sound .. 1 dead
+    air: Air
+
+
+class _Motion(NamedTuple):
+    """What is integrated."""
+
+    time: Scalar  # s
+    body: Any
+    rotors: PerRotor  # N
+
+
+@final
+class Plant:
+    """Body, rotors, wind and faults of one vehicle.
+
+    Parameters
+    ----------
+    model : BodyModel
+        How the body moves.
+    wind : Wind
+    faults : sequence of Fault
+    substeps : int
+        Runge-Kutta steps per sampling period, at least 1.
+
+    Raises
+    ------
+    InputError
+        If `substeps` is below 1.
+    """
+
+    def __init__(self, model: BodyModel, wind: Wind, faults: Sequence[Fault], substeps: int) -> None:
+        if substeps < 1:
+            raise InputError(f"substeps: got {substeps}; allowed: 1 or more")
+        self.model, self.wind, self.faults, self.substeps = model, wind, tuple(faults), substeps
+
+    def parameters(self, vehicle: Vehicle) -> PlantParameters:
+        """Numbers of the truth for a vehicle; any of them may be changed before a flight."""
+        return PlantParameters(vehicle, self.wind.parameters(), tuple(fault.parameters() for fault in self.faults))
+
+    def initial(
+        self,
+        p_W: Vec3,
+        v_W: Vec3,
+        attitude: Vec3,
+        omega_B: Vec3,
+        rotor_thrust: PerRotor,
+        parameters: PlantParameters,
+    ) -> PlantState:
+        """State at the start of a flight.
+
+        Parameters
+        ----------
+        p_W, v_W : Vec3, m and m/s, world frame
+        attitude : Vec3, rad
+            Roll, pitch, yaw.
+        omega_B : Vec3, rad/s, body frame
+        rotor_thrust : PerRotor, N
+            Thrusts k v that the rotors give if they are sound.
+        parameters : PlantParameters
+        """
+        body = self.model.initial(p_W, v_W, attitude, omega_B)
+        return PlantState(body, rotor_thrust / parameters.vehicle.rotor_gain)
+
+    def step(
+        self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, period: Scalar
+    ) -> PlantState:
+        """State one sampling period later.
+
+        Parameters
+        ----------
+        state : PlantState
+        command : Command
+            Held over the period; put within the rotor limits here.
+        time : scalar, s
+            At the start of the period, as counted steps times the period.
+        parameters : PlantParameters
+        period : scalar, s
+        """
+        command = command._replace(thrust=limited_command(parameters.vehicle, command.thrust))
+        dt = period * (1.0 / self.substeps)
+        for k in range(self.substeps):
+            state = self._substep(state, command, time + k * dt, parameters, dt)
+        return state
+
+    def _substep(
+        self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, dt: Scalar
+    ) -> PlantState:
+        vehicle = parameters.vehicle
+        fault = rotor_faults(self.faults, parameters.faults, time)
+
+        def derivative(motion: _Motion) -> _Motion:
+            thrust = delivered_thrust(vehicle, motion.rotors, fault)
+            speeds = true_rotor_speeds(vehicle, motion.rotors, fault)
+            body_dot = self.model.derivative(
+                motion.body,
+                wrench_of(vehicle, thrust),
+                command.direct_acceleration_W,
+                vehicle,
+                residual_speed(vehicle, speeds),
+                self.wind.at(motion.time, parameters.wind),
+            )
+            return _Motion(1.0, body_dot, lag_derivative(vehicle, motion.rotors, command.thrust))
+
+        after = rk4(derivative, _Motion(time, state.body, state.rotors), dt)
+        return PlantState(self.model.after_step(after.body), after.rotors)
+
+    def observe(self, state: PlantState, time: Scalar, parameters: PlantParameters) -> Truth:
+        """The truth at a time in s since the start of the flight."""
+        vehicle, fault = parameters.vehicle, self.fault(time, parameters)
+        return Truth(
+            measurement=self.model.observe(state.body),
+            thrust=delivered_thrust(vehicle, state.rotors, fault),
+            rotor_speed=true_rotor_speeds(vehicle, state.rotors, fault),
+            loss=true_loss(vehicle, state.rotors, fault),
+            air=self.wind.at(time, parameters.wind),
+        )
+
+    def fault(self, time: Scalar, parameters: PlantParameters) -> RotorFault:
+        """State of the rotors at a time in s."""
+        return rotor_faults(self.faults, parameters.faults, time)

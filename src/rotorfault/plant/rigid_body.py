@@ -1,0 +1,64 @@
+r"""The full rigid body: attitude as a unit quaternion, no angle at which it fails.
+
+.. math:: \dot p = v, \qquad \dot q = \tfrac12\, q \otimes (0, \omega)
+
+with Newton's and Euler's equations of `rotorfault.plant.models`. Unlike the paper's (3), body rates and Euler rates
+are told apart.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, final
+
+from rotorfault.geometry import Quat, Vec3
+from rotorfault.plant.models import PLANTS, acceleration, angular_acceleration
+from rotorfault.plant.wind import Air
+from rotorfault.scalar import Scalar
+from rotorfault.signals import Measurement, Wrench
+from rotorfault.vehicle import Vehicle
+
+
+class RigidBodyState(NamedTuple):
+    """State of the rigid body."""
+
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    q_WB: Quat  # body to world, of unit length
+    omega_B: Vec3  # rad/s
+
+
+@final
+@PLANTS.register("rigid_body")
+class RigidBody:
+    """Rigid body on SO(3): quaternion attitude, valid at any angle."""
+
+    def initial(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> RigidBodyState:
+        """State for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and body rates [rad/s]."""
+        return RigidBodyState(p_W, v_W, Quat.from_euler(attitude), omega_B)
+
+    def derivative(
+        self,
+        body: RigidBodyState,
+        wrench: Wrench,
+        extra_acceleration_W: Vec3,
+        vehicle: Vehicle,
+        residual_speed: Scalar,
+        air: Air,
+    ) -> RigidBodyState:
+        """Time derivative; see `rotorfault.plant.models.BodyModel`."""
+        R_WB = body.q_WB.matrix()
+        thrust_axis_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz)
+        return RigidBodyState(
+            p_W=body.v_W,
+            v_W=acceleration(vehicle, wrench.thrust, thrust_axis_W, body.v_W, air, extra_acceleration_W),
+            q_WB=body.q_WB.derivative(body.omega_B),
+            omega_B=angular_acceleration(vehicle, wrench.torque_B, body.omega_B, residual_speed),
+        )
+
+    def after_step(self, body: RigidBodyState) -> RigidBodyState:
+        """Bring the quaternion back to unit length, which integration keeps only to its own order."""
+        return body._replace(q_WB=body.q_WB.normalised())
+
+    def observe(self, body: RigidBodyState) -> Measurement:
+        """Attitude as Euler angles, roll and yaw in (-pi, pi]."""
+        return Measurement(body.p_W, body.v_W, body.q_WB.euler(), body.omega_B)
