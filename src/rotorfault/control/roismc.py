@@ -45,17 +45,17 @@ from rotorfault.vehicle import Vehicle
 class RoismcSettings(Strict):
     """Settings of the ROISMC law."""
 
-    weights: Weights = Field(Weights(), description="Q and R of (35)")
+    weights: Weights = Field(default=Weights(), description="Q and R of (35)")
     position: SwitchingSettings = Field(
-        SwitchingSettings(weight=(0.0349, 0.0423, 0.0265), k=(0.01, 0.01, 0.01), gamma_0=2.0, layer=1.0),
+        default=SwitchingSettings(weight=(0.0349, 0.0423, 0.0265), k=(0.01, 0.01, 0.01), gamma_0=2.0, layer=1.0),
         description="switching input of x, y, z",
     )
     attitude: SwitchingSettings = Field(
-        SwitchingSettings(weight=(0.0234, 0.087, 0.0766), k=(0.1, 0.1, 0.1), gamma_0=300.0, layer=15.0),
+        default=SwitchingSettings(weight=(0.0234, 0.087, 0.0766), k=(0.1, 0.1, 0.1), gamma_0=300.0, layer=15.0),
         description="switching input of roll, pitch, yaw",
     )
-    nominal: Nominal = Field("achieved", description="what the surface integrates: achieved | demanded")
-    switching: Switching = Field("smooth", description="smooth (sat) | discontinuous (sgn)")
+    nominal: Nominal = Field(default="achieved", description="what the surface integrates: achieved | demanded")
+    switching: Switching = Field(default="smooth", description="smooth (sat) | discontinuous (sgn)")
 
 
 class RoismcParameters(NamedTuple):

@@ -46,4 +46,4 @@ class Diagnoser(Protocol):
         """One sampling instant; pure."""
 
 
-DIAGNOSES: Registry[type[Diagnoser]] = Registry("diagnosis")
+DIAGNOSES: Registry[Any] = Registry("diagnosis")

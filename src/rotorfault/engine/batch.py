@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.geometry import zeros
 from rotorfault.plant.sensors import no_noise
-from rotorfault.records import flatten, unflatten
+from rotorfault.records import flatten
 from rotorfault.signals import Reference
 
 Array = NDArray[np.float64]
@@ -90,7 +91,8 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
 
 def drive_template(batch: Batch) -> Drive | Reference:
     """A record of the shape that the rows of `drive_rows` flatten."""
-    reference: Reference = unflatten(_REFERENCE, [0.0] * 12)
+    zero = zeros()
+    reference = Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
     return Drive(reference, no_noise()) if batch.loop.sensors.needs_noise else reference
 
 
@@ -107,12 +109,3 @@ def columns(record: Any, count: int) -> Array:
 def recorded(batch: Batch, first: int, length: int) -> list[int]:
     """Which steps of a chunk are to be recorded, counted from its first."""
     return [k for k in range(length) if (first + k) % batch.every == 0]
-
-
-def _reference_template() -> Reference:
-    from_names = {name: 0.0 for name in ("yaw", "yaw_rate", "yaw_acceleration")}
-    zero = no_noise().position
-    return Reference(p_W=zero, v_W=zero, a_W=zero, **from_names)
-
-
-_REFERENCE = _reference_template()

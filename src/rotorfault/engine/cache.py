@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorfault.closed_loop import ClosedLoop
+from rotorfault.engine.structure import parts_of, structure
 from rotorfault.files import write_atomically
 
 _KEPT: dict[str, Any] = {}
@@ -35,30 +36,15 @@ class Key(NamedTuple):
 
 def key(loop: ClosedLoop, compiler: str) -> Key:
     """Name of the compiled form of a loop."""
-    plant, autopilot = loop.plant, loop.autopilot
-    parts = [plant.model, plant.wind, *plant.faults, loop.sensors]
-    parts += [autopilot.diagnoser, autopilot.controller, autopilot.allocator]
+    words = [_package_digest(), compiler, platform.machine(), platform.processor(), *structure(loop)]
     lasting = True
-    words = [_package_digest(), compiler, platform.machine(), platform.processor(), str(plant.substeps)]
-    for part in parts:
-        words.append(describe(part))
+    for part in parts_of(loop):
         if not type(part).__module__.startswith("rotorfault."):
             source = _source(part)
             lasting = lasting and source is not None
             # Without source, only this very object can be known to be the same again.
             words.append(source if source is not None else str(id(part)))
     return Key(hashlib.sha256("\n".join(words).encode()).hexdigest(), lasting)
-
-
-def describe(part: Any) -> str:
-    """Class and settings of a part and of the parts in it."""
-    inside = [f"{name}={describe(value)}" for name, value in sorted(getattr(part, "__dict__", {}).items())]
-    kind = f"{type(part).__module__}.{type(part).__qualname__}"
-    if isinstance(part, (str, int, float, bool, type(None), tuple, list, dict)):
-        return repr(part)
-    if hasattr(type(part), "model_dump"):
-        return f"{kind}({part!r})"
-    return f"{kind}({', '.join(inside)})"
 
 
 def get(name: Key, make: Callable[[], Any]) -> Any:

@@ -1,0 +1,114 @@
+"""From scenarios to batches: make every part, collect its numbers, tabulate the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rotorfault.autopilot import Autopilot
+from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, Start
+from rotorfault.engine.batch import Array, Batch, Noise
+from rotorfault.engine.structure import structure
+from rotorfault.errors import InputError
+from rotorfault.geometry import Vec3
+from rotorfault.plant import PLANTS, Normals, no_noise
+from rotorfault.plant.plant import Plant
+from rotorfault.records import flatten, unflatten
+from rotorfault.reference import ReferenceTable
+from rotorfault.scenario import Scenario
+from rotorfault.signals import Reference
+
+
+def assemble(scenario: Scenario, controller: Any = None) -> Batch:
+    """A batch of the one flight that a scenario describes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    controller : Controller, optional
+        Flies in place of the scenario's.
+    """
+    vehicle = scenario.vehicle.vehicle
+    plant = Plant(
+        PLANTS[scenario.plant](),
+        scenario.wind.make(),
+        [fault.make() for fault in scenario.fault],
+        scenario.substeps,
+    )
+    sensors = scenario.sensors.make()
+    autopilot = Autopilot(
+        scenario.diagnosis.make(),
+        scenario.controller.make() if controller is None else controller,
+        scenario.allocation.make(),
+    )
+    loop = ClosedLoop(plant, sensors, autopilot)
+    parameters = LoopParameters(
+        plant=plant.parameters(scenario.mismatch.applied(vehicle)),
+        autopilot=autopilot.parameters(vehicle, scenario.period),
+        sensors=sensors.parameters(),
+        period=scenario.period,
+    )
+    times = np.arange(scenario.steps) * scenario.period
+    table = scenario.reference.make().table(times)
+    seeds = ((scenario.seed, 0),)
+    start = Start(*(Vec3.of(part) for part in _start(scenario)))
+    drive = Drive(_first(table), _first_noise(seeds) if sensors.needs_noise else no_noise())
+    state = loop.initial(start, drive, parameters)
+    return Batch(loop, state, parameters, reference_rows(table), 1, seeds, scenario.every)
+
+
+def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
+    """One batch of several flights that differ in numbers only: vehicle, start, wind, faults, gains, seed.
+
+    Raises
+    ------
+    InputError
+        If there are none, or they differ in structure (kinds of parts, options), in length or in reference.
+    """
+    if not scenarios:
+        raise InputError("no scenarios were given; a batch needs at least one")
+    batches = [assemble(scenario) for scenario in scenarios]
+    first = batches[0]
+    for batch, scenario in zip(batches[1:], scenarios[1:], strict=True):
+        same = structure(batch.loop) == structure(first.loop) and batch.every == first.every
+        if not same or not np.array_equal(batch.reference, first.reference):
+            raise InputError(
+                f"scenario '{scenario.name}' differs from the first in more than numbers (parts, options, length or "
+                "reference); fly it in a batch of its own"
+            )
+    return first._replace(
+        state=_stacked(first.state, [batch.state for batch in batches]),
+        parameters=_stacked(first.parameters, [batch.parameters for batch in batches]),
+        count=len(batches),
+        seeds=tuple((scenario.seed, i) for i, scenario in enumerate(scenarios)),
+    )
+
+
+def _stacked(template: Any, records: list[Any]) -> Any:
+    rows = np.array([[float(leaf) for leaf in flatten(record)] for record in records]).T
+    return unflatten(template, list(rows))
+
+
+def _start(scenario: Scenario) -> tuple[tuple[float, float, float], ...]:
+    s = scenario.start
+    return s.position, s.velocity, s.attitude, s.body_rates
+
+
+def _first(table: ReferenceTable) -> Reference:
+    return unflatten(table.at(0), [float(leaf) for leaf in flatten(table.at(0))])
+
+
+def _first_noise(seeds: tuple[tuple[int, int], ...]) -> Normals:
+    numbers: list[float] = Noise(seeds).draw(1)[0, :, 0].tolist()
+    return unflatten(no_noise(), numbers)
+
+
+def reference_rows(table: ReferenceTable) -> Array:
+    """A reference table as rows (n, 12) in the order of `Reference`."""
+    return np.column_stack(
+        [table.p_W, table.v_W, table.a_W, table.yaw, table.yaw_rate, table.yaw_acceleration]
+    )
+
+

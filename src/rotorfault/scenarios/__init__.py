@@ -1,0 +1,1 @@
+"""Built-in scenarios, as TOML files."""
