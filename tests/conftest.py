@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
 
 from rotorfault.vehicle import Vehicle
 from rotorfault.vehicle_file import load_vehicle
+
+# The same examples in every run, and none judged by the time it takes.
+settings.register_profile("rotorfault", deadline=None, derandomize=True, max_examples=60)
+settings.load_profile("rotorfault")
 
 
 @pytest.fixture(scope="session")

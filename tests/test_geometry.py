@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3, body_z_axis, euler_matrix, zeros
-
-settings.register_profile("rotorfault", deadline=None, derandomize=True, max_examples=60)
-settings.load_profile("rotorfault")
 
 component = st.floats(-100.0, 100.0)
 vectors = st.builds(Vec3, component, component, component)

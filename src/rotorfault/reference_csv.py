@@ -38,8 +38,11 @@ def read_table(path: str | Path) -> dict[str, Array]:
         values, or one that is no finite number; there are fewer than two rows, or the times do not grow.
     """
     lines = read_text(path).lstrip("\ufeff").splitlines()
-    reader = csv.reader(lines)
-    rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    reader = csv.reader(lines, skipinitialspace=True)
+    try:
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{path}: line {reader.line_num}: {error}; allowed: comma-separated numbers") from None
     if not rows:
         raise InputError(f"{path}: is empty; allowed: a header line with {', '.join(REQUIRED)} and rows of numbers")
     names = [name.strip() for name in rows[0][1]]

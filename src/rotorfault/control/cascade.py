@@ -132,8 +132,6 @@ def filtered(
 class Cascade:
     """A controller made of a law: position loop, command filter, attitude loop."""
 
-    python_only = False
-
     def __init__(self, law: Law, settings: CascadeSettings) -> None:
         self.law = law
         self.settings = settings

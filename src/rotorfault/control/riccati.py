@@ -152,9 +152,10 @@ def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> tuple[Gain, Sc
 def chord_step(problem: AttitudeProblem, gain: Gain) -> Gain:
     """Improve a symmetric gain cheaply: Newton's step with the off-diagonal parts of Y and Z left out of its slope.
 
-    For diagonal Qp, zero diagonal of W and |W| < 0.5 |Z| only; beyond about 0.6 it diverges. Start it from
-    `chord_start` or another gain with symmetric X, never from `guaranteed_gain`, and test its outcome with
-    `routh_stable`.
+    For diagonal Qp, zero diagonal of W and |W| < 0.5 min z_ii only (no failure in 12,000 cold starts). The weaker
+    |W| < 0.5 |Z| is enough where the axes' weights are alike, not where they span decades: 1 in 30 of those diverge.
+    Start it from `chord_start` or another gain with symmetric X, never from `guaranteed_gain`, and test its outcome
+    with `routh_stable`.
     """
     Y, X = gain
     Z = X - problem.W

@@ -61,8 +61,8 @@ def solve_iterated(problem: AttitudeProblem) -> Gain:
     if not least < _NEAR:
         raise InputError(
             f"the Riccati equation of the attitude block has no solution to working accuracy: relative residual "
-            f"{least:.1e} after {MOST_STEPS} steps. Weights of angles and inputs must be positive, those of rates not "
-            f"negative, and their orders of magnitude not too far apart. Scaled problem: {problem}"
+            f"{least:.1e} after {MOST_STEPS} steps. Weights of angles and inputs must be positive, those of rates "
+            f"not negative, and their orders of magnitude not too far apart. Scaled problem: {problem}"
         )
     return best
 
@@ -85,7 +85,7 @@ def cost_matrix(problem: AttitudeProblem, gain: Gain) -> Matrix:
     P11 = Y.T @ (X - W)
     unscale = np.tile(1.0 / np.array([float(s) for s in problem.S]), 2)
     scaled = np.block([[0.5 * (P11 + P11.T), Y.T], [Y, X]])
-    return np.asarray(unscale[:, None] * scaled * unscale, dtype=np.float64)
+    return np.asarray(np.outer(unscale, unscale) * scaled, dtype=np.float64)
 
 
 def closed_loop_poles(problem: AttitudeProblem, gain: Gain) -> npt.NDArray[np.complex128]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from rotorfault.config import Strict, Three
 from rotorfault.control.protocol import LawOutput, TrackingError
@@ -34,9 +34,25 @@ class Weights(Strict):
     position_q: Three = Field(default=(0.3, 0.3, 0.3), description="numerator of Q on x, y, z error, q1 = value/|e| [1/m]")
     position_q_rate: Three = Field(default=(0.005, 0.005, 0.005), description="Q on velocity error [s^2/m^2]")
     position_r: Three = Field(default=(0.2, 0.2, 0.4), description="factor of R, r = value e^2 [s^4/m^4]")
-    error_floor: float = Field(default=0.1, gt=0.0, description="smooth floor of |e| in Q and R [m]")
-    error_cap: float = Field(default=1e6, gt=0.0, description="smooth cap of |e| in Q and R [m]")
+    error_floor: Three = Field(default=(0.1, 0.1, 0.1), description="smooth floor of |e| in Q and R, x, y, z [m]")
+    error_cap: Three = Field(default=(1e6, 1e6, 1e6), description="smooth cap of |e| in Q and R, x, y, z [m]")
     newton_steps: int = Field(default=1, ge=1, le=20, description="Newton-Kleinman steps per sampling instant")
+
+    @field_validator(
+        "attitude_q_angle", "attitude_r", "position_q", "position_r", "error_floor", "error_cap"
+    )
+    @classmethod
+    def _positive(cls, value: Three) -> Three:
+        if not min(value) > 0.0:
+            raise ValueError("must be greater than 0 on each axis: the Riccati equation has no solution otherwise")
+        return value
+
+    @field_validator("attitude_q_rate", "position_q_rate")
+    @classmethod
+    def _not_negative(cls, value: Three) -> Three:
+        if min(value) < 0.0:
+            raise ValueError("must be 0 or greater on each axis")
+        return value
 
 
 class SdreParameters(NamedTuple):
@@ -48,8 +64,8 @@ class SdreParameters(NamedTuple):
     position_q: Vec3
     position_q_rate: Vec3
     position_r: Vec3
-    error_floor: Scalar  # m
-    error_cap: Scalar  # m
+    error_floor: Vec3  # m
+    error_cap: Vec3  # m
 
 
 def sdre_parameters(weights: Weights) -> SdreParameters:
@@ -61,8 +77,8 @@ def sdre_parameters(weights: Weights) -> SdreParameters:
         Vec3.of(weights.position_q),
         Vec3.of(weights.position_q_rate),
         Vec3.of(weights.position_r),
-        weights.error_floor,
-        weights.error_cap,
+        Vec3.of(weights.error_floor),
+        Vec3.of(weights.error_cap),
     )
 
 
@@ -91,10 +107,11 @@ def error_magnitude(e: Scalar, floor: Scalar, cap: Scalar) -> Scalar:
 def position_gains(e: Vec3, parameters: SdreParameters) -> tuple[Vec3, Vec3]:
     """Gains (k1, k2) of u = -k1 e - k2 e_dot per position axis, in 1/s^2 and 1/s."""
     gains = []
-    for e_i, q, q_rate, r in zip(
-        e, parameters.position_q, parameters.position_q_rate, parameters.position_r, strict=True
+    p = parameters
+    for e_i, floor, cap, q, q_rate, r in zip(
+        e, p.error_floor, p.error_cap, p.position_q, p.position_q_rate, p.position_r, strict=True
     ):
-        size = error_magnitude(e_i, parameters.error_floor, parameters.error_cap)
+        size = error_magnitude(e_i, floor, cap)
         gains.append(position_gain(q / size, q_rate, r * size * size))
     return Vec3.of(k1 for k1, _ in gains), Vec3.of(k2 for _, k2 in gains)
 

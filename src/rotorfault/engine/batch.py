@@ -109,3 +109,10 @@ def columns(record: Any, count: int) -> Array:
 def recorded(batch: Batch, first: int, length: int) -> list[int]:
     """Which steps of a chunk are to be recorded, counted from its first."""
     return [k for k in range(length) if (first + k) % batch.every == 0]
+
+
+def recording(records: list[Array], steps: list[int], interrupted: bool) -> Recording:
+    """Collect records taken one by one; KeyboardInterrupt if it came before the first of them."""
+    if not records:
+        raise KeyboardInterrupt
+    return Recording(np.stack(records), np.array(steps[: len(records)], dtype=float), interrupted)

@@ -14,6 +14,7 @@ from rotorfault.engine.batch import (
     drive_rows,
     drive_template,
     recorded,
+    recording,
 )
 from rotorfault.records import flatten, unflatten
 from rotorfault.telemetry import SIGNAL_NAMES, Signals
@@ -53,6 +54,6 @@ def run(batch: Batch, watch: Watch) -> Recording:
             if watch(first + len(rows), np.stack(records)):
                 break
     except KeyboardInterrupt:
-        return Recording(np.stack(records), np.array(steps, dtype=float), interrupted=True)
-    return Recording(np.stack(records), np.array(steps, dtype=float))
+        return recording(records, steps, interrupted=True)
+    return recording(records, steps, interrupted=False)
 

@@ -88,5 +88,7 @@ def run(batch: Batch, watch: Watch) -> Recording:
             if watch(first + len(rows), records[:filled]):
                 break
     except KeyboardInterrupt:
+        if filled == 0:
+            raise
         return Recording(records[:filled], steps[:filled], interrupted=True)
     return Recording(records[:filled], steps[:filled])

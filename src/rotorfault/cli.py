@@ -1,0 +1,204 @@
+"""The command line. Modules that take time to load are loaded by the command that needs them."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Optional
+
+import typer
+
+from rotorfault._version import __version__
+from rotorfault.errors import InputError
+
+app = typer.Typer(
+    name="rotorfault",
+    help="Design, prove and fly quadrotor control that survives rotor faults and wind.",
+    epilog="Start with:  rotorfault fly paper-set-point    then:  rotorfault list",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _load(module: str) -> Any:
+    return importlib.import_module(f"rotorfault.{module}")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def fly(
+    scenario: Annotated[
+        Optional[str], typer.Argument(help="Built-in scenario (see 'rotorfault list') or a TOML file.")
+    ] = None,
+    controller: Annotated[
+        Optional[str],
+        typer.Option(help="Registered controller, or FILE.py:NAME for your own (a class without arguments)."),
+    ] = None,
+    preset: Annotated[Optional[str], typer.Option(help="Preset of the controller: paper, tuned ...")] = None,
+    assignments: Annotated[
+        Optional[list[str]],
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key, e.g. fault.0.loss=0.4; may be repeated."),
+    ] = None,
+    engine: Annotated[Optional[str], typer.Option(help="simd, numpy or python; the fastest installed.")] = None,
+    seed: Annotated[Optional[int], typer.Option(help="Seed of the sensor noise.")] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    out: Annotated[
+        Optional[Path], typer.Option(metavar="DIR", help="Folder for results; results/SCENARIO-CONTROLLER if not given.")
+    ] = None,
+    repeat: Annotated[
+        Optional[Path], typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
+    ] = None,
+) -> None:
+    """Fly a scenario: print what happened, write flight.nc, summary.json and figures.
+
+    Example: rotorfault fly paper-set-point --controller smc --set wind.kind=none --out results/calm
+    """
+    flight = _load("flight")
+    if repeat is not None:
+        given = (scenario, controller, preset, assignments, seed)
+        if any(value is not None for value in given):
+            raise InputError("--repeat takes scenario, controller and settings from the file; give it alone")
+        folder = out or Path("results") / "repeat"
+        _load("files").output_folder(folder)
+        _finish(flight.repeat(repeat, engine), folder, figures)
+        return
+    if scenario is None:
+        raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
+    settings = _load("scenario").parse_overrides(assignments or [])
+    if preset is not None:
+        settings = {"controller.preset": preset, **settings}
+    own = _own_controller(controller) if controller is not None and ".py:" in controller else controller
+    checked = flight.prepare(scenario, own if isinstance(own, str) else None, settings, seed)
+    label = checked.controller.kind if own is None or isinstance(own, str) else type(own).__name__
+    folder = out or Path("results") / f"{checked.name}-{label}"
+    _load("files").output_folder(folder)
+    if own is None or isinstance(own, str):
+        for warning in _load("trim").sampled_data_warnings(checked):
+            typer.echo(f"warning: {warning}", err=True)
+    _finish(flight.fly(checked, None if isinstance(own, str) else own, engine=engine), folder, figures)
+
+
+def _finish(flight: Any, folder: Path, figures: bool) -> None:
+    typer.echo(str(flight.summary()))
+    written = flight.write(folder, with_figures=figures)
+    typer.echo(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+    if flight.outcome.kind == "interrupted":
+        raise typer.Exit(130)
+
+
+def _own_controller(place: str) -> Any:
+    """Load FILE.py:NAME and make one."""
+    file, _, name = place.rpartition(":")
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"--controller {place}: no such file {path}; allowed: FILE.py:NAME")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"--controller {place}: {path} is no Python module")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    try:
+        spec.loader.exec_module(module)
+        return getattr(module, name)()
+    except AttributeError:
+        raise InputError(f"--controller {place}: {path} has no class '{name}'") from None
+    except Exception as error:
+        raise InputError(f"--controller {place}: {type(error).__name__}: {' '.join(str(error).split())}") from None
+
+
+@app.command()
+def compare(
+    flights: Annotated[list[Path], typer.Argument(metavar="A.nc B.nc ...", help="Two or more flight files.")],
+    out: Annotated[Optional[Path], typer.Option(metavar="DIR", help="Folder for figures.")] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+) -> None:
+    """Compare flights: one table, and figures with all of them together.
+
+    Example: rotorfault compare results/a/flight.nc results/b/flight.nc --out results/a-b
+    """
+    if len(flights) < 2:
+        raise InputError(f"got {len(flights)} flight file; compare needs at least two")
+    comparison = _load("report.comparison")
+    folder = out or Path("results") / "compare"
+    if figures:
+        _load("files").output_folder(folder)
+    loaded = comparison.labelled(flights)
+    comparison.print_table(loaded)
+    if figures:
+        written = comparison.draw(loaded, folder)
+        typer.echo(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+
+
+@app.command("list")
+def list_parts(
+    what: Annotated[Optional[str], typer.Argument(help="Only this: controllers, vehicles, scenarios ...")] = None,
+) -> None:
+    """List everything registered, one line each."""
+    typer.echo(_load("catalogue").text(what))
+
+
+@app.command()
+def new(
+    what: Annotated[str, typer.Argument(metavar="vehicle|scenario", help="What to write.")],
+    name: Annotated[str, typer.Argument(help="Its name; the file becomes NAME.toml.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path("."),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
+) -> None:
+    """Write a commented TOML file that works, to start from."""
+    path = _load("catalogue").write_new(what, name, out, force)
+    typer.echo(f"wrote {path}; check it with: rotorfault check {path}")
+
+
+@app.command()
+def check(file: Annotated[Path, typer.Argument(help="Vehicle or scenario TOML file, or a flight.nc.")]) -> None:
+    """Validate a file: one line that says what is wrong and how to mend it, or what it holds."""
+    typer.echo(_load("catalogue").check(file))
+
+
+@app.command()
+def trim(
+    vehicle: Annotated[str, typer.Argument(help="Built-in vehicle or a TOML file.")],
+    controller: Annotated[str, typer.Option(help="Registered controller.")] = "roismc",
+    preset: Annotated[Optional[str], typer.Option(help="Preset of the controller.")] = None,
+    period: Annotated[float, typer.Option(help="Sampling period [s].")] = 0.001,
+) -> None:
+    """Print hover, linearisation, closed-loop poles, gain and delay margins.
+
+    Example: rotorfault trim paper --controller smc
+    """
+    typer.echo(_load("trim").trim_report(_load("vehicle_file").load_vehicle(vehicle).vehicle, controller, preset, period).text())
+
+
+def main() -> None:
+    """Entry point: errors of the user in one line with exit code 2, Ctrl-C with 130."""
+    try:
+        app(standalone_mode=True)
+    except InputError as error:
+        typer.echo(f"rotorfault: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("rotorfault: interrupted", err=True)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,269 @@
+r"""The closed loop about hover as a linear discrete system.
+
+With x all numbers that a flight carries from one sampling instant to the next (plant and autopilot memory), d a
+wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
+
+.. math:: x_{k+1} = f(x_k, d_k), \quad y_k = h(x_k) \qquad\Rightarrow\qquad
+          x_{k+1} = A x_k + B d_k, \quad y_k = C x_k
+
+with A, B, C from central differences of the very code that flies. Much of the memory does not act on the motion to
+first order: counters and constants, the last position, flags, and the Riccati gain, which multiplies an error of
+zero. Such states act on no other ones that do, so A is block triangular and leaving them out changes no pole of the
+rest: exact, no approximation.
+
+The plant's input is broken behind the autopilot, which goes on believing that the rotors do what it commanded.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.allocation import ALLOCATORS
+from rotorfault.allocation.mixer import nominal_inverse
+from rotorfault.allocation.protocol import settings_class
+from rotorfault.autopilot import Autopilot
+from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, level_start, quiet
+from rotorfault.config import Strict
+from rotorfault.diagnosis import DIAGNOSES
+from rotorfault.errors import InputError
+from rotorfault.geometry import Vec3, zeros
+from rotorfault.plant import WINDS
+from rotorfault.plant.plant import Plant
+from rotorfault.records import flatten, leaf_names, unflatten
+from rotorfault.signals import Command, Reference, Wrench
+from rotorfault.vehicle import Vehicle, wrench_of
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+AXES = ("thrust", "roll", "pitch", "yaw")
+STEP = 1e-5  # of a central difference, relative to max(1, |x|)
+SETTLED = 1e-11  # relative change per period below which the loop counts as settled
+MOST_SETTLING = 400  # periods
+# A state acts on another where a perturbation moves it by more than rounding.
+ROUNDING = 1e-14
+ROUGH = 1e-2  # relative difference of two Jacobians above which there is no derivative
+DEADBEAT = 1e-3  # |z| below which a pole is memory of a period or two, no motion
+
+
+class LinearLoop(NamedTuple):
+    """A closed loop about an equilibrium: x+ = A x + B d, y = C x, axes in the order of `AXES`."""
+
+    A: Array  # (n, n)
+    B: Array  # (n, 4): wrench added at the plant's input, N and N m
+    C: Array  # (4, n): wrench that the commands ask for, N and N m
+    period: float  # s
+    names: tuple[str, ...]  # of the n states
+    left_out: tuple[str, ...]  # states that do not act on the motion to first order
+    residual: float  # largest relative change of a state per period, where the loop was linearised
+
+    @property
+    def poles(self) -> Complex:
+        """Poles in the z plane, slowest first."""
+        z = np.linalg.eigvals(self.A).astype(complex)
+        return z[np.argsort(-np.abs(z))]
+
+    @property
+    def continuous_poles(self) -> Complex:
+        """log(z)/T in rad/s of all poles but those at z = 0, which are memory of a period or two; slowest first."""
+        z = self.poles
+        s = np.log(z[np.abs(z) > DEADBEAT]) / self.period
+        order: Complex = s[np.argsort(np.abs(s))]
+        return order
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles are inside the unit circle."""
+        return bool(np.all(np.abs(self.poles) < 1.0))
+
+    def loop_transfer(self, omega: Array) -> Complex:
+        """L of `rotorfault.margins` for each axis at frequencies in rad/s up to pi/period; shape (frequencies, 4)."""
+        z = np.exp(1j * np.asarray(omega, dtype=float) * self.period)
+        resolvent = z[:, None, None] * np.eye(len(self.A)) - self.A
+        T = np.einsum("in,wni->wi", self.C, np.linalg.solve(resolvent, self.B[None] + 0j))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            L: Complex = -T / (1.0 + T)
+        return L
+
+    def changed(self, axis: str, gain: float = 1.0, delay: int = 0) -> Array:
+        """A of the same loop with a gain and a delay of whole periods at the plant's input of one axis.
+
+        Parameters
+        ----------
+        axis : str
+            One of `AXES`.
+        gain : float
+        delay : int
+            Periods, 0 or more.
+        """
+        i, n = AXES.index(axis), len(self.A)
+        b, c = self.B[:, [i]], self.C[[i], :]
+        opened = self.A - b @ c
+        if delay == 0:
+            return opened + gain * (b @ c)
+        big = np.zeros((n + delay, n + delay))
+        big[:n, :n], big[:n, [n]] = opened, gain * b
+        big[n : n + delay - 1, n + 1 :] = np.eye(delay - 1)
+        big[[n + delay - 1], :n] = c
+        return big
+
+
+# ------------------------------------------------------------------------------------------------------ linearisation
+
+
+def calm(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False) -> tuple[ClosedLoop, LoopParameters]:
+    """The same loop without wind and faults; without diagnosis and with nominal allocation unless `keep_belief`.
+
+    An observer acts on the motion through its decision alone, and a belief that changes by jumps has no derivative.
+    """
+    plant = Plant(loop.plant.model, WINDS["none"](Strict()), (), loop.plant.substeps)
+    parameters = parameters._replace(
+        plant=parameters.plant._replace(wind=plant.wind.parameters(), faults=()), period=float(parameters.period)
+    )
+    if keep_belief:
+        return ClosedLoop(plant, loop.sensors, loop.autopilot), parameters
+    off, nominal = DIAGNOSES["off"], ALLOCATORS["nominal"]
+    diagnoser = off(off.Settings())
+    autopilot = Autopilot(diagnoser, loop.autopilot.controller, nominal(settings_class(nominal)()))
+    belief = parameters.autopilot._replace(
+        diagnosis=diagnoser.parameters(parameters.autopilot.vehicle, parameters.period)
+    )
+    return ClosedLoop(plant, loop.sensors, autopilot), parameters._replace(autopilot=belief)
+
+
+def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False) -> LinearLoop:
+    """Linearise a closed loop about the hover in which it settles, reference at rest at the origin.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+        Its wind and faults are left out.
+    parameters : LoopParameters
+        Of floats.
+    keep_belief : bool
+        Keep diagnosis and allocation as they are; else diagnosis `off` and allocation `nominal`.
+
+    Raises
+    ------
+    InputError
+        If the loop settles nowhere, or has no derivative where it settles (discontinuous switching).
+    """
+    flight = _Flight(*calm(loop, parameters, keep_belief))
+    x = _settled(flight)
+    for _ in range(3):
+        A, C, kept = _jacobian(flight, x, STEP)
+        change = flight.advance(x)[0] - x
+        residual = float(np.max(np.abs(change / _scale(x))[kept]))
+        if residual <= SETTLED:
+            break
+        # The rest of the way, as far as there is one: to where a step changes nothing.
+        x = x.copy()
+        x[kept] += np.linalg.lstsq(np.eye(len(kept)) - A[np.ix_(kept, kept)], change[kept], rcond=None)[0]
+    if not residual <= 1e-6:
+        raise InputError(f"the loop does not come to rest in hover (change of {residual:.2g} a period): check the gains")
+    finer = _jacobian(flight, x, STEP / 4.0)[0]
+    inner = np.ix_(kept, kept)
+    if not np.max(np.abs(A - finer)[inner] / (1.0 + np.abs(A[inner]))) <= ROUGH:
+        raise InputError("the loop has no derivative in hover; choose switching = 'smooth'")
+    names = leaf_names(flight.template)
+    return LinearLoop(
+        A=A[inner],
+        B=_input(flight, x)[kept],
+        C=C[:, kept],
+        period=flight.period,
+        names=tuple(names[i] for i in kept),
+        left_out=tuple(name for i, name in enumerate(names) if i not in set(kept)),
+        residual=residual,
+    )
+
+
+class _Flight:
+    """The loop as a map of arrays."""
+
+    def __init__(self, loop: ClosedLoop, parameters: LoopParameters) -> None:
+        self.loop, self.parameters, self.period = loop, parameters, float(parameters.period)
+        self.vehicle: Vehicle = parameters.plant.vehicle
+        zero = zeros()
+        self.drive: Drive = quiet(Reference(zero, zero, zero, 0.0, 0.0, 0.0))
+        self.template: LoopState = loop.initial(level_start(zero), self.drive, parameters)
+
+    def start(self) -> Array:
+        return _floats(self.template)
+
+    def advance(self, x: Array, added: Array | None = None) -> tuple[Array, Array]:
+        """State after a period with a wrench added at the plant's input, and the wrench that was asked for."""
+        state: LoopState = unflatten(self.template, x.tolist())
+        after, signals = self.loop.step(state, self.drive, self.parameters)
+        k = self.vehicle.rotor_gain
+        if added is not None:
+            extra = nominal_inverse(self.vehicle, Wrench(float(added[0]), Vec3.of(added[1:].tolist()))) / k
+            command = Command(signals.thrust_command + extra, after.autopilot.direct_acceleration_W)
+            time = state.steps * self.period
+            after = after._replace(
+                plant=self.loop.plant.step(state.plant, command, time, self.parameters.plant, self.period)
+            )
+        return _floats(after), _floats(wrench_of(self.vehicle, signals.thrust_command * k))
+
+
+def _floats(record: object) -> Array:
+    return np.array([float(leaf) for leaf in flatten(record)])
+
+
+def _scale(x: Array) -> Array:
+    return np.maximum(1.0, np.abs(x))
+
+
+def _settled(flight: _Flight) -> Array:
+    """The state of least change; an unstable loop leaves its equilibrium again."""
+    x = best = flight.start()
+    counted = leaf_names(flight.template).index("steps")
+    least = math.inf
+    for _ in range(MOST_SETTLING):
+        after, _ = flight.advance(x)
+        change = np.abs(after - x) / _scale(x)
+        change[counted] = 0.0
+        largest = float(np.max(change))
+        if not largest < 1e3 * max(least, SETTLED):
+            break
+        if largest < least:
+            least, best = largest, after
+        if largest < SETTLED:
+            break
+        x = after
+    return best
+
+
+def _jacobian(flight: _Flight, x: Array, step: float) -> tuple[Array, Array, list[int]]:
+    """A and C for all states by central differences, and the indices of the states that act on the motion."""
+    h = step * _scale(x)
+    moved, asked = [], []
+    for d in np.diag(h):
+        (above, y_above), (below, y_below) = flight.advance(x + d), flight.advance(x - d)
+        moved.append(above - below)
+        asked.append(y_above - y_below)
+    differences = np.array(moved).T
+    acts = np.abs(differences) > ROUNDING * _scale(x)[:, None]
+    A = np.where(acts, differences / (2.0 * h), 0.0)
+    return A, np.array(asked).T / (2.0 * h), _acting(acts, flight)
+
+
+def _input(flight: _Flight, x: Array) -> Array:
+    """B for all states."""
+    vehicle = flight.vehicle
+    arm = max(math.hypot(a, b) for a, b in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+    h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, vehicle.torque_ratio])
+    return np.array([flight.advance(x, d)[0] - flight.advance(x, -d)[0] for d in np.diag(h)]).T / (2.0 * h)
+
+
+def _acting(acts: NDArray[np.bool_], flight: _Flight) -> list[int]:
+    """Indices of the plant's states and of all that act on them, directly or through others."""
+    kept = np.array([name.startswith("plant.") for name in leaf_names(flight.template)])
+    while True:
+        more = kept | np.any(acts[kept], axis=0)
+        if np.array_equal(more, kept):
+            return [int(i) for i in np.flatnonzero(kept)]
+        kept = more

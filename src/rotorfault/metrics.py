@@ -1,0 +1,233 @@
+"""What a flight was worth: outcome, settling, errors, cost, effort, detections.
+
+Every number is computed from the records of the flight alone, by the definitions given here:
+
+- *Outcome*: ``diverged`` (a state is not finite, or further than 10 km away), ``tumbled`` (tilt beyond 90 degrees)
+  or ``ground`` (below the scenario's ground), each with the time at which the flight ended; else ``settled``
+  (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square error
+  over the last half within 5 % of the reference's span on every axis) or ``offset`` (flew to the end, but neither).
+- *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
+  where an axis has none; of the span for a moving reference) to the end; None if it never does.
+- *Cost*: J = 1/2 int (e'Qe + u'Ru) dt with the printed weights (35), |e| floored at 0.01 m in both, e against the
+  scenario's reference (roll and pitch reference 0), u the torque given [N m] and the commanded acceleration less
+  gravity and feed-forward [m/s^2], after limits. The same for every law and preset.
+- *Detection* of a rotor: from its first true loss to the first flag. ``loss_estimated`` is the believed loss read
+  150 ms after the onset, ``loss_error`` its largest error from then on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from rotorfault.engine.batch import Array
+from rotorfault.telemetry import SIGNAL_NAMES
+
+SETTLED = 0.02  # of the step
+TRACKED = 0.05  # of the span
+ERROR_FLOOR = 0.01  # m, in the cost's Q and R
+READ_AFTER = 0.15  # s after a fault at which the estimated loss is read
+FAR = 1e4  # m
+SURVIVED = ("settled", "tracked", "offset")
+
+_ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
+_AXES = ("x", "y", "z")
+_ANGLES = ("roll", "pitch", "yaw")
+
+
+class Outcome(NamedTuple):
+    """How a flight ended."""
+
+    kind: str  # settled, tracked, offset, ground, tumbled, diverged, interrupted
+    time: float  # s: end of the flight
+
+    @property
+    def survived(self) -> bool:
+        """Whether the vehicle was flying when the flight ended."""
+        return self.kind in SURVIVED
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.time:.3f} s"
+
+
+def first_loss(signals: Array, ground: float | None) -> tuple[int, str] | None:
+    """Record at which a flight is lost and why, or None.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (records, rows of `Signals`)
+    ground : float or None
+        Height of the ground in m.
+    """
+    position = signals[:, _ROW["position.x"] : _ROW["position.x"] + 3]
+    attitude = signals[:, _ROW["attitude.x"] : _ROW["attitude.x"] + 3]
+    # "Not inside", so that NaN counts as outside.
+    with np.errstate(invalid="ignore"):
+        finite = np.isfinite(signals).all(axis=1) & (np.abs(position) < FAR).all(axis=1)
+        upright = np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]) > 0.0
+        above = np.ones(len(signals), dtype=bool) if ground is None else position[:, 2] >= ground
+    for_each = (("diverged", ~finite), ("tumbled", ~upright), ("ground", ~above))
+    found = [(int(np.argmax(lost)), kind) for kind, lost in for_each if lost.any()]
+    return min(found, key=lambda item: item[0]) if found else None
+
+
+def bands(data: xr.Dataset, share: float) -> NDArray[np.float64]:
+    """Half width per axis [m] within which an error counts as small."""
+    reference, start = data["position_reference"].values, data["position"].values[0]
+    if constant_reference(data):
+        size = np.abs(reference[0] - start)
+    else:
+        size = np.ptp(reference, axis=0)
+    largest = float(size.max())
+    size = np.where(size > 1e-9, size, largest if largest > 1e-9 else 1.0)
+    return np.asarray(share * size)
+
+
+def constant_reference(data: xr.Dataset) -> bool:
+    """Whether the position reference never moves."""
+    return bool((np.ptp(data["position_reference"].values, axis=0) == 0.0).all())
+
+
+def judge(data: xr.Dataset) -> str:
+    """Outcome of a flight that flew to its end: settled, tracked or offset."""
+    error = np.abs(data["position"].values - data["position_reference"].values)
+    if constant_reference(data):
+        return "settled" if (error[-1] <= bands(data, SETTLED)).all() else "offset"
+    half = error[len(error) // 2 :]
+    return "tracked" if (np.sqrt(np.mean(half**2, axis=0)) <= bands(data, TRACKED)).all() else "offset"
+
+
+def settle_times(data: xr.Dataset) -> dict[str, float | None]:
+    """Settling time per axis and overall in s; None where it never settles."""
+    time = data["time"].values
+    outside = np.abs(data["position"].values - data["position_reference"].values) > bands(data, SETTLED)
+    found: dict[str, float | None] = {}
+    for axis, column in zip(_AXES, outside.T, strict=True):
+        last = np.flatnonzero(column)
+        if len(last) and last[-1] == len(time) - 1:
+            found[axis] = None
+        else:
+            found[axis] = float(time[last[-1] + 1]) if len(last) else 0.0
+    each = [found[axis] for axis in _AXES]
+    found["overall"] = None if None in each else max(t for t in each if t is not None)
+    return found
+
+
+def attitude_error(data: xr.Dataset, against: str) -> NDArray[np.float64]:
+    """Attitude error in rad, wrapped, shape (records, 3), against 'reference' or 'demand'."""
+    attitude = data["attitude"].values
+    if against == "demand":
+        target = data["attitude_demand"].values
+    else:
+        target = np.zeros_like(attitude)
+        target[:, 2] = data["yaw_reference"].values
+    gap = attitude - target
+    return np.asarray(np.arctan2(np.sin(gap), np.cos(gap)))
+
+
+def cost(data: xr.Dataset) -> float:
+    """Cost J of the flight, (19) with (35) as read in the module's docstring."""
+    e = data["position"].values - data["position_reference"].values
+    e_dot = data["velocity"].values - data["velocity_reference"].values
+    angle, rate = attitude_error(data, "reference"), data["body_rates"].values
+    size = np.maximum(np.abs(e), ERROR_FLOOR)
+    u_position = data["virtual_position"].values
+    u_attitude = data["torque_demand"].values - data["torque_unallocated"].values
+    state = np.sum(angle**2 + rate**2 + 0.3 / size * e**2 + 0.005 * e_dot**2, axis=1)
+    effort = np.sum(0.0088 * u_attitude**2 + np.array([0.2, 0.2, 0.4]) * size**2 * u_position**2, axis=1)
+    return float(0.5 * np.trapezoid(state + effort, data["time"].values))
+
+
+def detections(data: xr.Dataset) -> list[dict[str, Any]]:
+    """One entry for each rotor that truly lost thrust."""
+    time = data["time"].values
+    found = []
+    for i in range(4):
+        true = data["loss_true"].values[:, i]
+        hit = np.flatnonzero(true > 0.0)
+        if not len(hit):
+            continue
+        onset = int(hit[0])
+        flags = np.flatnonzero(data["fault_flag"].values[onset:, i] > 0.5)
+        detected = float(time[onset + flags[0]]) if len(flags) else None
+        read = np.flatnonzero(time >= time[onset] + READ_AFTER - 1e-9)
+        believed = data["loss_believed"].values[:, i]
+        found.append(
+            {
+                "rotor": i + 1,
+                "true_time": float(time[onset]),
+                "detected_time": detected,
+                "delay": None if detected is None else detected - float(time[onset]),
+                "loss_true": float(true[read[0]] if len(read) else true[-1]),
+                "loss_estimated": float(believed[read[0]]) if len(read) else None,
+                "loss_error": float(np.abs(believed[read] - true[read]).max()) if len(read) else None,
+            }
+        )
+    return found
+
+
+def false_alarms(data: xr.Dataset) -> int:
+    """How often a rotor was flagged that had lost nothing at that time."""
+    flags, true = data["fault_flag"].values > 0.5, data["loss_true"].values
+    raised = flags & ~np.vstack([np.zeros((1, 4), dtype=bool), flags[:-1]])
+    return int(np.sum(raised & (true == 0.0)))
+
+
+def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> dict[str, Any]:
+    """All numbers of a flight, JSON-ready.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Up to the end of the flight.
+    outcome : Outcome
+    limits : (2,) float
+        Least and largest thrust of a rotor in N.
+    """
+    command = data["thrust_command"].values
+    error = data["position"].values - data["position_reference"].values
+    attitude = data["attitude"].values
+    cosine = np.cos(attitude[:, 0]) * np.cos(attitude[:, 1])
+    tolerance = 1e-9 * max(1.0, limits[1])
+    saturated = ((command <= limits[0] + tolerance) | (command >= limits[1] - tolerance)).any(axis=1)
+    nobody: dict[str, float | None] = dict.fromkeys((*_AXES, "overall"))
+    V = data["lyapunov"].values
+    return {
+        "outcome": outcome.kind,
+        "survived": outcome.survived,
+        "end_time": outcome.time,
+        "settle_time": settle_times(data) if outcome.survived else nobody,
+        "position_mse": _per(_AXES, np.mean(error**2, axis=0)),
+        "attitude_mse": _per(_ANGLES, np.mean(attitude_error(data, "reference") ** 2, axis=0)),
+        "attitude_demand_mse": _per(_ANGLES, np.mean(attitude_error(data, "demand") ** 2, axis=0)),
+        "position_error_end": _per(_AXES, error[-1]),
+        "attitude_end": _per(_ANGLES, attitude[-1]),
+        "cost": cost(data),
+        "tilt_max": float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
+        "attitude_max": _per(_ANGLES, np.abs(attitude).max(axis=0)),
+        "control_total_variation": float(np.abs(np.diff(command, axis=0)).sum()),
+        "saturated_fraction": float(saturated.mean()),
+        "lyapunov_rising_fraction": float(np.mean(np.diff(V) > 0.0)) if len(V) > 1 else 0.0,
+        "given_up_fraction": _per(("tilt", "thrust", "yaw"), np.mean(data["given_up"].values > 0.5, axis=0)),
+        "detections": detections(data),
+        "false_alarms": false_alarms(data),
+        "largest_riccati_residual": float(data["riccati_residual"].values.max()),
+        "riccati_guarded_fraction": float(np.mean(data["riccati_guarded"].values > 0.5)),
+    }
+
+
+def _per(names: tuple[str, ...], values: NDArray[np.float64]) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+def finite_or_none(value: Any) -> Any:
+    """The same data with None for numbers that JSON cannot hold."""
+    if isinstance(value, dict):
+        return {key: finite_or_none(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [finite_or_none(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

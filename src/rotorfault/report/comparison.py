@@ -1,0 +1,40 @@
+"""Several flights side by side: a table, and figures with all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from rotorfault.flight import Flight, load
+from rotorfault.report import figures
+from rotorfault.report.text import comparison
+
+
+def labelled(paths: Sequence[Path]) -> dict[str, Flight]:
+    """Flights by a label that tells them apart: the controller, with the folder where that is not enough."""
+    loaded = [load(path) for path in paths]
+    labels = [flight.label for flight in loaded]
+    if len(set(labels)) < len(labels):
+        labels = [f"{label} ({path.parent.name})" for label, path in zip(labels, paths, strict=True)]
+    if len(set(labels)) < len(labels):
+        labels = [f"{label} {number}" for number, label in enumerate(labels, start=1)]
+    return dict(zip(labels, loaded, strict=True))
+
+
+def print_table(flights: dict[str, Flight]) -> None:
+    """Print the numbers of all flights, a column each."""
+    header, *lines = comparison({label: flight.summary() for label, flight in flights.items()})
+    table = Table(title=", ".join(dict.fromkeys(str(f.data.attrs["scenario"]) for f in flights.values())))
+    for text in header:
+        table.add_column(text, overflow="fold")
+    for line in lines:
+        table.add_row(*line)
+    Console().print(table)
+
+
+def draw(flights: dict[str, Flight], folder: Path) -> list[Path]:
+    """Draw all flights together into a folder."""
+    return figures.save(figures.draw({label: flight.data for label, flight in flights.items()}), folder)
