@@ -33,6 +33,8 @@ CASCADE: Space = [
     ("cascade.filter_bandwidth", 8.0, 25.0, 80.0),
     ("cascade.tilt_max", 0.4, 0.8, 1.1),
     ("cascade.horizontal_lag", 2.0, 8.0, 30.0),
+    ("cascade.fall_share", 0.05, 0.3, 0.8),
+    ("cascade.thrust_share", 0.8, 0.95, 1.0),
 ]
 SPACES: dict[str, Space] = {
     "roismc": [
@@ -111,7 +113,8 @@ def settings(controller: str, values: dict[str, float]) -> dict[str, Any]:
         law["attitude"]["k"] = [0.0112, 0.0156, 0.876] if paper else [0.1] * 3
     if controller == "smc":
         law["position"].update({key: [v[f"position.{key}"]] * 3 for key in ("slope", "reaching", "K")})
-        law["attitude"].update({key: [v[f"roll.{key}"]] * 2 + [v[f"yaw.{key}"]] for key in ("slope", "reaching", "K")})
+        for key in ("slope", "reaching", "K"):
+            law["attitude"][key] = [v[f"roll.{key}"]] * 2 + [v[f"yaw.{key}"]]
     return {**tables, "law": law}
 
 
@@ -176,7 +179,7 @@ def main() -> None:
             scenarios += [flight.model_copy(update={"controller": part}) for flight in flights]
         recording = engine(assemble_all(scenarios), no_watch)
         scores = [score(s, recording.signals[:, :, i]) for i, s in enumerate(scenarios)]
-        weights = np.array([5.0] + [1.0] * arguments.neighbours)
+        weights = np.array([10.0] + [1.0] * arguments.neighbours)
         table_ = np.array(scores).reshape(len(points), len(flights))
         return list(table_ @ weights / weights.sum())
 
@@ -190,9 +193,9 @@ def main() -> None:
         costs = evaluate(points)
         search.tell(points, costs)
         if generation % 5 == 0:
-            print(f"generation {generation:3d}  best {search.result.fbest:.4f}  median {np.median(costs):.4f}", flush=True)
+            print(f"{generation:3d}  best {search.result.fbest:.4f}  median {np.median(costs):.4f}", flush=True)
     best = search.result.xbest
-    print(f"# CMA-ES: {arguments.generations} generations x {arguments.population} candidates x {len(flights)} flights,")
+    print(f"# CMA-ES, {arguments.generations} generations of {arguments.population}, {len(flights)} flights each,")
     print(f"# seed {arguments.seed}, objective {search.result.fbest:.4f}")
     print(as_toml(settings(arguments.controller, values(best))))
     print([round(s, 4) for s in (evaluate([best]))])

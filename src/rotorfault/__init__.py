@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rotorfault._version import __version__
 
 if TYPE_CHECKING:
-    from rotorfault.control.protocol import CONTROLLERS, Controller, ControlInputs, ControlOutput, no_telemetry
+    from rotorfault.control.protocol import CONTROLLERS, ControlInputs, Controller, ControlOutput, no_telemetry
     from rotorfault.errors import InputError
     from rotorfault.flight import Flight, fly, fly_all, load, repeat
     from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3

@@ -81,7 +81,7 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     return first._replace(
         state=_stacked(first.state, [batch.state for batch in batches]),
         parameters=_stacked(first.parameters, [batch.parameters for batch in batches]),
-        count=len(batches),
+        flights=len(batches),
         seeds=tuple((scenario.seed, i) for i, scenario in enumerate(scenarios)),
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple, final
 
 from rotorfault.allocation.protocol import Allocator
-from rotorfault.control.protocol import Controller, ControlInputs, ControlTelemetry, Prediction
+from rotorfault.control.protocol import ControlInputs, Controller, ControlTelemetry, Prediction
 from rotorfault.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.diagnosis.rotor_model import RotorModel, expected_thrust, follow, rotors_at_hover
 from rotorfault.geometry import PerRotor, Vec3, body_z_axis, zeros

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from rotorfault import dataset
 from rotorfault.allocation import ALLOCATORS
@@ -21,7 +22,7 @@ from rotorfault.registry import Registry, unknown
 from rotorfault.scenario import load_scenario, new_scenario, scenario_from, scenario_names
 from rotorfault.vehicle_file import load_vehicle, new_vehicle, vehicle_names
 
-REGISTRIES: dict[str, Registry[object]] = {
+REGISTRIES: dict[str, Registry[Any]] = {
     "controllers": CONTROLLERS,
     "plants": PLANTS,
     "references": REFERENCES,
@@ -30,7 +31,7 @@ REGISTRIES: dict[str, Registry[object]] = {
     "sensors": SENSORS,
     "diagnoses": DIAGNOSES,
     "allocators": ALLOCATORS,
-}  # type: ignore[assignment, dict-item]
+}
 
 
 def entries() -> dict[str, dict[str, str]]:

@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any
 
 import typer
 
@@ -47,25 +47,25 @@ def _root(
 @app.command()
 def fly(
     scenario: Annotated[
-        Optional[str], typer.Argument(help="Built-in scenario (see 'rotorfault list') or a TOML file.")
+        str | None, typer.Argument(help="Built-in scenario (see 'rotorfault list') or a TOML file.")
     ] = None,
     controller: Annotated[
-        Optional[str],
+        str | None,
         typer.Option(help="Registered controller, or FILE.py:NAME for your own (a class without arguments)."),
     ] = None,
-    preset: Annotated[Optional[str], typer.Option(help="Preset of the controller: paper, tuned ...")] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of the controller: paper, tuned ...")] = None,
     assignments: Annotated[
-        Optional[list[str]],
+        list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override a key, e.g. fault.0.loss=0.4; may be repeated."),
     ] = None,
-    engine: Annotated[Optional[str], typer.Option(help="simd, numpy or python; the fastest installed.")] = None,
-    seed: Annotated[Optional[int], typer.Option(help="Seed of the sensor noise.")] = None,
+    engine: Annotated[str | None, typer.Option(help="simd, numpy or python; the fastest installed.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the sensor noise.")] = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
     out: Annotated[
-        Optional[Path], typer.Option(metavar="DIR", help="Folder for results; results/SCENARIO-CONTROLLER if not given.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for results; results/SCENARIO-CONTROLLER if not given.")
     ] = None,
     repeat: Annotated[
-        Optional[Path], typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
+        Path | None, typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
     ] = None,
 ) -> None:
     """Fly a scenario: print what happened, write flight.nc, summary.json and figures.
@@ -128,7 +128,7 @@ def _own_controller(place: str) -> Any:
 @app.command()
 def compare(
     flights: Annotated[list[Path], typer.Argument(metavar="A.nc B.nc ...", help="Two or more flight files.")],
-    out: Annotated[Optional[Path], typer.Option(metavar="DIR", help="Folder for figures.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for figures.")] = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
 ) -> None:
     """Compare flights: one table, and figures with all of them together.
@@ -150,7 +150,7 @@ def compare(
 
 @app.command("list")
 def list_parts(
-    what: Annotated[Optional[str], typer.Argument(help="Only this: controllers, vehicles, scenarios ...")] = None,
+    what: Annotated[str | None, typer.Argument(help="Only this: controllers, vehicles, scenarios ...")] = None,
 ) -> None:
     """List everything registered, one line each."""
     typer.echo(_load("catalogue").text(what))
@@ -178,7 +178,7 @@ def check(file: Annotated[Path, typer.Argument(help="Vehicle or scenario TOML fi
 def trim(
     vehicle: Annotated[str, typer.Argument(help="Built-in vehicle or a TOML file.")],
     controller: Annotated[str, typer.Option(help="Registered controller.")] = "roismc",
-    preset: Annotated[Optional[str], typer.Option(help="Preset of the controller.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of the controller.")] = None,
     period: Annotated[float, typer.Option(help="Sampling period [s].")] = 0.001,
 ) -> None:
     """Print hover, linearisation, closed-loop poles, gain and delay margins.

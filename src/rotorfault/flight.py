@@ -219,7 +219,7 @@ def load(path: str | Path) -> Flight:
 
 def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
     grounds = [scenario.ground for scenario in scenarios]
-    lost = np.zeros(batch.count, dtype=bool)
+    lost = np.zeros(batch.flights, dtype=bool)
     looked = 0
     with Bar("flying", batch.steps * scenarios[0].period, "s") as bar:
 

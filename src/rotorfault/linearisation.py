@@ -27,12 +27,11 @@ from rotorfault.allocation.mixer import nominal_inverse
 from rotorfault.allocation.protocol import settings_class
 from rotorfault.autopilot import Autopilot
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, level_start, quiet
-from rotorfault.config import Strict
 from rotorfault.diagnosis import DIAGNOSES
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3, zeros
-from rotorfault.plant import WINDS
 from rotorfault.plant.plant import Plant
+from rotorfault.plant.wind import NoWind
 from rotorfault.records import flatten, leaf_names, unflatten
 from rotorfault.signals import Command, Reference, Wrench
 from rotorfault.vehicle import Vehicle, wrench_of
@@ -64,16 +63,15 @@ class LinearLoop(NamedTuple):
     @property
     def poles(self) -> Complex:
         """Poles in the z plane, slowest first."""
-        z = np.linalg.eigvals(self.A).astype(complex)
+        z: Complex = np.linalg.eigvals(self.A).astype(np.complex128)
         return z[np.argsort(-np.abs(z))]
 
     @property
     def continuous_poles(self) -> Complex:
         """log(z)/T in rad/s of all poles but those at z = 0, which are memory of a period or two; slowest first."""
         z = self.poles
-        s = np.log(z[np.abs(z) > DEADBEAT]) / self.period
-        order: Complex = s[np.argsort(np.abs(s))]
-        return order
+        s: Complex = np.log(z[np.abs(z) > DEADBEAT]) / self.period
+        return s[np.argsort(np.abs(s))]
 
     @property
     def stable(self) -> bool:
@@ -115,12 +113,14 @@ class LinearLoop(NamedTuple):
 # ------------------------------------------------------------------------------------------------------ linearisation
 
 
-def calm(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False) -> tuple[ClosedLoop, LoopParameters]:
+def calm(
+    loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False
+) -> tuple[ClosedLoop, LoopParameters]:
     """The same loop without wind and faults; without diagnosis and with nominal allocation unless `keep_belief`.
 
     An observer acts on the motion through its decision alone, and a belief that changes by jumps has no derivative.
     """
-    plant = Plant(loop.plant.model, WINDS["none"](Strict()), (), loop.plant.substeps)
+    plant = Plant(loop.plant.model, NoWind(NoWind.Settings()), (), loop.plant.substeps)
     parameters = parameters._replace(
         plant=parameters.plant._replace(wind=plant.wind.parameters(), faults=()), period=float(parameters.period)
     )
@@ -164,7 +164,7 @@ def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = 
         x = x.copy()
         x[kept] += np.linalg.lstsq(np.eye(len(kept)) - A[np.ix_(kept, kept)], change[kept], rcond=None)[0]
     if not residual <= 1e-6:
-        raise InputError(f"the loop does not come to rest in hover (change of {residual:.2g} a period): check the gains")
+        raise InputError(f"the loop does not come to rest in hover (it still changes by {residual:.2g} a period)")
     finer = _jacobian(flight, x, STEP / 4.0)[0]
     inner = np.ix_(kept, kept)
     if not np.max(np.abs(A - finer)[inner] / (1.0 + np.abs(A[inner]))) <= ROUGH:
@@ -256,7 +256,9 @@ def _input(flight: _Flight, x: Array) -> Array:
     vehicle = flight.vehicle
     arm = max(math.hypot(a, b) for a, b in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
     h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, vehicle.torque_ratio])
-    return np.array([flight.advance(x, d)[0] - flight.advance(x, -d)[0] for d in np.diag(h)]).T / (2.0 * h)
+    moved = np.array([flight.advance(x, d)[0] - flight.advance(x, -d)[0] for d in np.diag(h)]).T
+    B: Array = moved / (2.0 * h)
+    return B
 
 
 def _acting(acts: NDArray[np.bool_], flight: _Flight) -> list[int]:

@@ -7,7 +7,9 @@ With axis i broken and all other axes closed, the loop transfer function, negati
 A gain g there brings a pole onto the unit circle where g L_i = -1, a delay tau where L_i exp(-j w tau) = -1; so from
 a stable loop the nearest such g and tau *are* the margins, however often L_i crosses, and whether or not L_i itself
 is stable. Source: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, chapter 3. A delay of
-whole periods is meant exactly, of fractions as its phase. Roll carries y and pitch carries x: the position loop is
+whole periods is meant exactly, of fractions as its phase.
+
+Roll carries y and pitch carries x: the position loop is
 closed through the attitude, so these two have a lower gain margin as well. The autopilot knows nothing of gain or
 delay; a law that compares motion with commands (roismc, ismc) takes them for a disturbance.
 """
@@ -69,11 +71,11 @@ def _margins_of(linear: LinearLoop, i: int, omega: Array, L: Complex) -> Margins
     up, down = math.inf, 0.0
     crossings = [
         at(brentq(lambda w: at(w).imag, omega[k], omega[k + 1]))
-        for k in np.flatnonzero(pairs & (L.imag[:-1] * L.imag[1:] < 0.0) & (L.real[:-1] < 0.0))
+        for k in np.flatnonzero(pairs & (L.imag[:-1] * L.imag[1:] < 0.0))
     ]
-    # At half the sampling frequency L is real: a crossing that changes no sign.
-    for crossing in [*crossings, complex(L[-1])]:
-        if crossing.real < 0.0 and abs(crossing) > LOOP_GAIN_RANGE[0]:
+    # At z = 1 and z = -1 L is real without changing sign.
+    for crossing in [*crossings, at(0.0), at(math.pi / linear.period)]:
+        if crossing.real < 0.0 and LOOP_GAIN_RANGE[0] < abs(crossing) < LOOP_GAIN_RANGE[1]:
             g = 1.0 / abs(crossing)
             up, down = (min(up, g), down) if g > 1.0 else (up, max(down, g))
     delay, phase, crossover = math.inf, math.inf, math.nan

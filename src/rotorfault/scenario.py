@@ -272,7 +272,7 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             here = here[_index(here, part, key)]
         elif isinstance(here, dict):
             inner = here.get(part)
-            if isinstance(inner, str) and depth == len(path) - 1 or inner is None:
+            if (isinstance(inner, str) and depth == len(path) - 1) or inner is None:
                 # A bare name stands for a table with that kind.
                 inner = here[part] = {} if inner is None else {"kind": inner}
             here = inner

@@ -86,7 +86,7 @@ class VehicleFile(Strict):
     inertia_x: Inertia = Field(description="kg m^2, principal moment about the forward axis")
     inertia_y: Inertia = Field(description="kg m^2, principal moment about the left axis")
     inertia_z: Inertia = Field(description="kg m^2, principal moment about the upward axis")
-    rotor_inertia: Annotated[Quantity, _not_negative("kg m^2")] = Field(description="kg m^2, one rotor about its axis")
+    rotor_inertia: Annotated[Quantity, _not_negative("kg m^2")] = Field(description="kg m^2, one rotor on its axis")
     thrust_coefficient: Annotated[Quantity, _positive("N/(rad/s)^2")] = Field(
         description="N/(rad/s)^2, thrust per squared rotor speed"
     )
@@ -141,7 +141,7 @@ class VehicleFile(Strict):
                 message = f"got '{b.yaw}'; allowed: '{a.yaw}', as rotors {first + 1} and {second + 1} are a pair"
                 return refusal(f"rotor.{second}.yaw", message)
         if self.rotor[0].yaw == self.rotor[2].yaw:
-            message = f"got '{self.rotor[2].yaw}' for both pairs; allowed: one sign for rotors 1, 2, the other for 3, 4"
+            message = f"got '{self.rotor[2].yaw}' for both pairs; allowed: one for rotors 1, 2, the other for 3, 4"
             return refusal("rotor.2.yaw", message)
         return None
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, Protocol
 
-from rotorfault.control.protocol import Controller, ControlInputs, ControlOutput, no_telemetry
+from rotorfault.control.protocol import ControlInputs, Controller, ControlOutput, no_telemetry
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3, zeros
 from rotorfault.records import flatten

@@ -24,7 +24,6 @@ from rotorfault.scalar import Scalar, sqrt
 from rotorfault.vehicle import Vehicle
 
 
-
 class Weights(Strict):
     """Weights of the quadratic cost, equation (35)."""
 

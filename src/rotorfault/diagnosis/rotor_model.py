@@ -31,7 +31,8 @@ def rotors_at_hover(vehicle: Vehicle) -> RotorModel:
 
 def expected_thrust(model: RotorModel, vehicle: Vehicle) -> PerRotor:
     """Thrust of sound rotors now, in N."""
-    return model.lagged * vehicle.rotor_gain
+    thrust: PerRotor = model.lagged * vehicle.rotor_gain
+    return thrust
 
 
 def follow(model: RotorModel, command: PerRotor, vehicle: Vehicle, dt: Scalar) -> RotorModel:

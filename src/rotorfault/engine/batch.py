@@ -25,7 +25,7 @@ class Batch(NamedTuple):
     state: LoopState  # leaves are floats, or arrays (N,)
     parameters: LoopParameters  # leaves are floats, or arrays (N,)
     reference: Array  # (steps, 12): rows of `Reference`, shared by all flights
-    count: int  # N
+    flights: int  # N
     seeds: tuple[tuple[int, int], ...]  # (seed, flight index) per flight: names its random numbers
     every: int = 1  # record each so many steps
 
@@ -85,7 +85,7 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
         if noise is None:
             yield first, reference
         else:
-            shared = np.broadcast_to(reference, (*reference.shape[:2], batch.count))
+            shared = np.broadcast_to(reference, (*reference.shape[:2], batch.flights))
             yield first, np.concatenate([shared, noise.draw(len(reference))], axis=1)
 
 

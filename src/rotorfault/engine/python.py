@@ -26,10 +26,10 @@ def run(batch: Batch, watch: Watch) -> Recording:
     Where float arithmetic raises (division by zero, overflow) the flight goes on as NaN, as in the other engines.
     """
     template = drive_template(batch)
-    numbers, starts = columns(batch.parameters, batch.count), columns(batch.state, batch.count)
-    parameters = [unflatten(batch.parameters, numbers[:, i].tolist()) for i in range(batch.count)]
-    states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.count)]
-    lost = [False] * batch.count
+    numbers, starts = columns(batch.parameters, batch.flights), columns(batch.state, batch.flights)
+    parameters = [unflatten(batch.parameters, numbers[:, i].tolist()) for i in range(batch.flights)]
+    states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.flights)]
+    lost = [False] * batch.flights
     missing = [np.nan] * len(SIGNAL_NAMES)
     records: list[Array] = []
     steps: list[int] = []
@@ -38,7 +38,7 @@ def run(batch: Batch, watch: Watch) -> Recording:
             wanted = set(recorded(batch, first, len(rows)))
             for k, row in enumerate(rows):
                 taken: list[list[float]] = []
-                for i in range(batch.count):
+                for i in range(batch.flights):
                     drive = as_drive(unflatten(template, row[:, min(i, row.shape[1] - 1)].tolist()))
                     signals: Signals | None = None
                     if not lost[i]:

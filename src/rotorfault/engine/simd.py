@@ -52,30 +52,30 @@ def run(batch: Batch, watch: Watch) -> Recording:
     """Fly a batch on SIMD lanes; see `rotorfault.engine.batch.Engine`."""
     step = compiled(batch)
     lanes = hy.recommended_simd_size()
-    padded = -(-batch.count // lanes) * lanes
+    padded = -(-batch.flights // lanes) * lanes
 
     def widened(rows: Array) -> Array:
         # Spare lanes fly the last flight again: a lane of zeros could cost time in NaN or denormal arithmetic.
-        return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, padded - batch.count)), mode="edge"))
+        return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, padded - batch.flights)), mode="edge"))
 
-    parameters, start = widened(columns(batch.parameters, batch.count)), widened(columns(batch.state, batch.count))
+    parameters, start = widened(columns(batch.parameters, batch.flights)), widened(columns(batch.state, batch.flights))
     n_drive, n_state = len(flatten(drive_template(batch))), len(start)
     n_rows = n_drive + len(step.fn)
     buffers = [np.zeros((n_rows, padded)) for _ in range(2)]
     reads = [b[: n_drive + n_state] for b in buffers]
     writes = [b[n_drive:] for b in buffers]
     drives = [b[:n_drive] for b in buffers]
-    seen = [b[n_drive + n_state :, : batch.count] for b in buffers]
+    seen = [b[n_drive + n_state :, : batch.flights] for b in buffers]
     buffers[0][n_drive : n_drive + n_state] = start
 
     capacity = -(-batch.steps // batch.every)
-    records = np.empty((capacity, n_rows - n_drive - n_state, batch.count))
+    records = np.empty((capacity, n_rows - n_drive - n_state, batch.flights))
     steps = np.empty(capacity)
     filled = now = 0
     try:
         for first, rows in drive_rows(batch):
             if rows.shape[2] > 1:
-                rows = np.pad(rows, ((0, 0), (0, 0), (0, padded - batch.count)), mode="edge")
+                rows = np.pad(rows, ((0, 0), (0, 0), (0, padded - batch.flights)), mode="edge")
             wanted = set(recorded(batch, first, len(rows)))
             for k, row in enumerate(rows):
                 then = 1 - now

@@ -6,35 +6,28 @@ dotted lines, times and units stand on every axis. matplotlib's global settings 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, MaxNLocator
 
 from rotorfault.errors import InputError
 from rotorfault.files import output_folder, write_atomically
 from rotorfault.report.panels import (
-    ONSET,
     Flight,
     Panel,
     dashed,
-    draw_panel,
     flights,
     legend,
-    mark_onsets,
     sample,
     solid,
     timeline,
-    whole,
 )
-from rotorfault.report.style import BLACK, DPI, GREY, STYLE, envelope, extremes, new_figure, padded, span
+from rotorfault.report.style import BLACK, DPI, GREY, STYLE, new_figure
 
 DASHED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4.0, 2.2)), "linewidth": 0.9}
 THRESHOLD: dict[str, Any] = {"color": GREY, "linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.8}

@@ -1,0 +1,176 @@
+r"""Can a control law be flown at this sampling period and with these rotors? A cheap check of its gains, per axis.
+
+Laws are designed in continuous time for ideal actuators, :math:`\ddot e = u = -k_1 e - k_2\dot e`; they fly sampled,
+behind rotors that lag. For the gains that a controller reports (`ControlTelemetry`), hence for any controller, the
+nominal axis is therefore closed again through a zero-order hold and a first-order lag, exactly,
+
+.. math:: \frac{d}{dt}\begin{pmatrix} e\\ \dot e\\ a\end{pmatrix} =
+          \begin{pmatrix} \dot e\\ a\\ w_0(u_k - a)\end{pmatrix}, \qquad u_k = -k_1 e_k - k_2\dot e_k
+
+and an axis is warned of if a sampled pole z is outside the unit circle or its damping -Re(log z)/|log z| is below
+0.1. Source of the sampling: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, section 3.2;
+the limit on damping is our choice. A warning is therefore a proof that the nominal gains are too fast, no warning is
+no proof that all is well: x and y are taken to have the rotors' lag only, as if the attitude followed at once, and
+coupling, limits and switching inputs are left out. `rotorfault.linearisation` has the whole loop in hover.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from rotorfault.control.protocol import ControlInputs, ControlOutput, Prediction
+from rotorfault.geometry import Vec3, zeros
+from rotorfault.linearisation import Array, Complex
+from rotorfault.scenario import Scenario
+from rotorfault.signals import Measurement, Reference
+from rotorfault.vehicle import Vehicle
+
+LEAST_DAMPING = 0.1
+
+
+class AxisGains(NamedTuple):
+    """Nominal feedback u = -k1 e - k2 e_dot of one axis."""
+
+    axis: str
+    k1: float  # 1/s^2
+    k2: float  # 1/s
+    direct: bool = False  # acts at once, without rotors: x and y under the option `six_inputs`
+
+    @property
+    def nominal_pole(self) -> complex:
+        """Fastest pole of the nominal loop in continuous time with an ideal actuator, rad/s."""
+        return complex(max(np.roots([1.0, self.k2, self.k1]), key=abs))
+
+
+def sampled_poles(gains: AxisGains, period: float, rotor_bandwidth: float) -> Complex:
+    """Poles z of one nominal axis, sampled and behind its actuators.
+
+    Parameters
+    ----------
+    gains : AxisGains
+    period : float, s
+    rotor_bandwidth : float, rad/s
+    """
+    n = 2 if gains.direct else 3
+    A, B = np.diag(np.ones(n - 1), 1), np.zeros(n)
+    B[-1] = 1.0 if gains.direct else rotor_bandwidth
+    if not gains.direct:
+        A[-1, -1] = -rotor_bandwidth
+    K = np.array([gains.k1, gains.k2, 0.0][:n])
+    held: Array = expm(np.block([[A, B[:, None]], [np.zeros((1, n + 1))]]) * period)
+    z: Complex = np.linalg.eigvals(held[:n, :n] - np.outer(held[:n, n], K)).astype(complex)
+    return z
+
+
+def damping(z: Complex) -> float:
+    """Least damping of poles in the z plane: negative if one is outside the unit circle, 1 if all are real in (0, 1).
+
+    Poles at zero do not count.
+    """
+    s = np.log(z[np.abs(z) > 1e-12])
+    return float(np.min(-s.real / np.maximum(np.abs(s), 1e-300), initial=1.0))
+
+
+def warning(gains: AxisGains, period: float, rotor_bandwidth: float, where: str) -> str | None:
+    """What is wrong with one axis, in one line with numbers; None if nothing is."""
+    if not (math.isfinite(gains.k1) and math.isfinite(gains.k2)):
+        return f"{gains.axis} {where}: the controller's gains are not finite"
+    z = sampled_poles(gains, period, rotor_bandwidth)
+    least, p = damping(z), gains.nominal_pole
+    if least >= LEAST_DAMPING:
+        return None
+    verdict = f"unstable, |z| = {max(abs(z)):.3g}" if least < 0.0 else f"hardly damped, damping {least:.2g}"
+    path = "" if gains.direct else f" behind rotors of {rotor_bandwidth:g} rad/s"
+    pole = f"{p.real:.4g} rad/s" if abs(p.imag) < 1e-9 * abs(p) else f"{p.real:.4g} +- {abs(p.imag):.4g}j rad/s"
+    return (
+        f"{gains.axis} {where}: nominal pole {pole} (|p| T = {abs(p) * period:.2g}, |p| / w0 = "
+        f"{abs(p) / rotor_bandwidth:.2g}); sampled every {period:g} s{path} the loop is {verdict}"
+    )
+
+
+def reported_gains(
+    controller: Any, vehicle: Vehicle, period: float, measurement: Measurement, reference: Reference
+) -> tuple[AxisGains, ...]:
+    """Gains that a controller reports at its first step; an axis without any is left out.
+
+    Of the attitude's gain matrices the diagonals are taken.
+    """
+
+    def first_step(seen: Measurement) -> ControlOutput:
+        numbers = controller.parameters(vehicle, period)
+        memory = controller.initial(seen, reference, numbers)
+        inputs = ControlInputs(seen, reference, vehicle, Prediction(zeros(), zeros()), 0.0)
+        output: ControlOutput = controller.step(memory, inputs, numbers, period)[1]
+        return output
+
+    told = first_step(measurement).telemetry
+    # Displaced sideways, only a controller with direct inputs commands an acceleration without rotors.
+    direct = first_step(measurement._replace(p_W=reference.p_W + Vec3(0.1, 0.1, 0.0))).direct_acceleration_W
+    rows = [
+        *zip("xyz", told.gain_position, told.gain_velocity, direct, strict=True),
+        *zip(("roll", "pitch", "yaw"), told.gain_angle.diag, told.gain_rate.diag, zeros(), strict=True),
+    ]
+    return tuple(AxisGains(axis, k1, k2, d != 0.0) for axis, k1, k2, d in rows if (k1, k2) != (0.0, 0.0))
+
+
+def sampled_data_check(
+    controller: Any,
+    vehicle: Vehicle,
+    period: float,
+    measurement: Measurement | None = None,
+    reference: Reference | None = None,
+) -> list[str]:
+    """Warn where a controller's nominal loop is too fast for the sampling period or the rotors.
+
+    Parameters
+    ----------
+    controller : Controller
+        Any; one that reports no gains cannot be checked and gives no warning.
+    vehicle : Vehicle
+        As the autopilot believes it to be; its `rotor_bandwidth` is the lag.
+    period : float, s
+    measurement, reference : optional
+        Start of a flight, checked besides the hover at the target.
+
+    Returns
+    -------
+    list of str
+        One line per axis that cannot be flown well, with numbers; empty if there is none.
+    """
+    zero = zeros()
+    target = Reference(zero, zero, zero, 0.0, 0.0, 0.0)
+    places = [("at the target", Measurement(zero, zero, zero, zero), target)]
+    if measurement is not None:
+        places.append(("at the start", measurement, target if reference is None else reference))
+    found: dict[str, str] = {}
+    for where, seen, wanted in places:
+        for gains in reported_gains(controller, vehicle, period, seen, wanted):
+            line = warning(gains, period, vehicle.rotor_bandwidth, where)
+            if line is not None:
+                found.setdefault(gains.axis, line)
+    return list(found.values())
+
+
+def check_scenario(scenario: Scenario, controller: Any = None) -> list[str]:
+    """`sampled_data_check` of the flight that a scenario describes, at the target and at the start.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    controller : Controller, optional
+        Flies in place of the scenario's.
+    """
+    s = scenario.start
+    start = Measurement(*(Vec3.of(part) for part in (s.position, s.velocity, s.attitude, s.body_rates)))
+    table = scenario.reference.make().table(np.zeros(1))
+    return sampled_data_check(
+        scenario.controller.make() if controller is None else controller,
+        scenario.vehicle.vehicle,
+        scenario.period,
+        start,
+        table.at(0),
+    )
