@@ -91,7 +91,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7, help="repetitions, of which the median is taken")
     parser.add_argument("--rate", type=float, default=5.0, help="largest body rate [rad/s]")
     parser.add_argument("--weight", type=float, default=0.0088, help="R of (35)")
-    parser.add_argument("--steps", type=int, default=1, help="Newton-Kleinman steps of the compiled batch; two more are timed too")
+    parser.add_argument("--steps", type=int, default=1, help="steps of the compiled batch; two more are timed too")
     options = parser.parse_args()
 
     rng = np.random.default_rng(1)

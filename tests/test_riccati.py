@@ -13,6 +13,7 @@ from scipy.linalg import block_diag, solve_continuous_are, solve_continuous_lyap
 from rotorfault.control.riccati import (
     AttitudeProblem,
     Gain,
+    _positive_definite,
     attitude_problem,
     chord_start,
     chord_step,
@@ -268,6 +269,43 @@ def test_flown_gain_always_stabilises(rate: float, steps: int) -> None:
             else:
                 # The cost of a start at the very edge is so large that rounding in the next step may raise an alarm.
                 assert np.sum(guarded[was_stable]) <= 2e-3 * n, name
+
+
+def test_a_start_that_passes_the_cost_matrix_by_rounding_is_not_flown() -> None:
+    """Found among 100,000 starts: a pole at +10/s, and yet six positive pivots."""
+    problem = AttitudeProblem(
+        Mat3(
+            0.0, -0.030478402190791707, 0.23652299607631658,
+            0.07152759760029348, 0.0, -0.012639224779747235,
+            0.02057969667682488, -0.003295572589606334, 0.0,
+        ),
+        Mat3.diagonal(Vec3(0.21342483043501062, 40.980753376313345, 601.0844629094671)),
+        Mat3.diagonal(Vec3(0.18988864541438236, 0.6971433674972457, 21.67650039500362)),
+        ONE,
+    )  # fmt: skip
+    stored = Gain(
+        Mat3(
+            1.6034063297483676, 45.78251247749362, -25.84518138167365,
+            -3.1366921388992655, 27.263972743056563, 18.480085477222925,
+            1.3311472474884696, 9.09804902572288, 74.67767734263062,
+        ),
+        Mat3(
+            265.13735027795997, -855.0166526352351, -303.77572579291353,
+            -855.0166526352351, 2757.721518454499, 979.5851630119258,
+            -303.77572579291353, 979.5851630119258, 348.1392593011112,
+        ),
+    )  # fmt: skip
+    flown, _, guarded = fly(problem, stored, 1)
+    assert guarded == 1.0
+    assert closed_loop_poles(problem, flown).real.max() < 0.0
+
+
+def test_an_infinite_cost_is_not_positive_definite() -> None:
+    none, one_ = Mat3.diagonal(ONE * 0.0), Mat3.identity()
+    assert _positive_definite(one_, none, one_) == 1.0
+    for bad in (0.0, -1.0, math.inf, math.nan):
+        assert _positive_definite(Mat3.diagonal(Vec3(1.0, bad, 1.0)), none, one_) == 0.0
+        assert _positive_definite(one_, none, Mat3.diagonal(Vec3(1.0, 1.0, bad))) == 0.0
 
 
 def test_both_tests_of_stability_agree_with_eigenvalues() -> None:

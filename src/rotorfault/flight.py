@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,7 +21,6 @@ from rotorfault.errors import InputError
 from rotorfault.files import output_folder, write_atomically
 from rotorfault.metrics import Outcome, finite_or_none, first_loss, judge, summary
 from rotorfault.progress import Bar
-from rotorfault.report import figures
 from rotorfault.report.text import summary_text
 from rotorfault.scenario import Scenario, load_scenario, override, scenario_from
 
@@ -67,7 +67,7 @@ class Flight:
 
     def plot(self) -> dict[str, Figure]:
         """The figures, as matplotlib figures by name: position, attitude, rotor_speeds, path, fault_detection, ..."""
-        return figures.draw(self.data)
+        return _figures().draw(self.data)  # type: ignore[no-any-return]
 
     def to_csv(self, path: str | Path) -> Path:
         """Write all signals as one table, a row per record and a column per component."""
@@ -105,8 +105,13 @@ class Flight:
         written = [self.save(folder / "flight.nc"), folder / "summary.json"]
         write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
         if with_figures:
-            written += figures.save(self.plot(), folder)
+            written += _figures().save(self.plot(), folder)
         return written
+
+
+def _figures() -> Any:
+    # matplotlib takes a second to load, which a flight without figures need not spend.
+    return importlib.import_module("rotorfault.report.figures")
 
 
 def fly(

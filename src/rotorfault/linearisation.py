@@ -16,6 +16,7 @@ The plant's input is broken behind the autopilot, which goes on believing that t
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import NamedTuple
 
@@ -33,6 +34,7 @@ from rotorfault.geometry import Vec3, zeros
 from rotorfault.plant.plant import Plant
 from rotorfault.plant.wind import NoWind
 from rotorfault.records import flatten, leaf_names, unflatten
+from rotorfault.scalar import Scalar
 from rotorfault.signals import Command, Reference, Wrench
 from rotorfault.vehicle import Vehicle, wrench_of
 
@@ -70,7 +72,7 @@ class LinearLoop(NamedTuple):
     def continuous_poles(self) -> Complex:
         """log(z)/T in rad/s of all poles but those at z = 0, which are memory of a period or two; slowest first."""
         z = self.poles
-        s: Complex = np.log(z[np.abs(z) > DEADBEAT]) / self.period
+        s: Complex = np.asarray(np.log(z[np.abs(z) > DEADBEAT]) / self.period, dtype=np.complex128)
         return s[np.argsort(np.abs(s))]
 
     @property
@@ -124,11 +126,13 @@ def calm(
     parameters = parameters._replace(
         plant=parameters.plant._replace(wind=plant.wind.parameters(), faults=()), period=float(parameters.period)
     )
+    # A copy, for trial steps must not change a controller that keeps state of its own.
+    autopilot = copy.deepcopy(loop.autopilot)
     if keep_belief:
-        return ClosedLoop(plant, loop.sensors, loop.autopilot), parameters
+        return ClosedLoop(plant, loop.sensors, autopilot), parameters
     off, nominal = DIAGNOSES["off"], ALLOCATORS["nominal"]
     diagnoser = off(off.Settings())
-    autopilot = Autopilot(diagnoser, loop.autopilot.controller, nominal(settings_class(nominal)()))
+    autopilot = Autopilot(diagnoser, autopilot.controller, nominal(settings_class(nominal)()))
     belief = parameters.autopilot._replace(
         diagnosis=diagnoser.parameters(parameters.autopilot.vehicle, parameters.period)
     )
@@ -150,15 +154,19 @@ def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = 
     Raises
     ------
     InputError
-        If the loop settles nowhere, or has no derivative where it settles (discontinuous switching).
+        If the loop settles nowhere, has no derivative where it settles (discontinuous switching), or the controller
+        keeps state of its own outside its memory, so that the same step gives different results.
     """
     flight = _Flight(*calm(loop, parameters, keep_belief))
     x = _settled(flight)
+    moved = x + STEP * _scale(x)
+    if not np.array_equal(flight.advance(moved)[0], flight.advance(moved)[0], equal_nan=True):
+        raise InputError("the controller keeps state of its own outside its memory; such a loop cannot be linearised")
     for _ in range(3):
         A, C, kept = _jacobian(flight, x, STEP)
         change = flight.advance(x)[0] - x
         residual = float(np.max(np.abs(change / _scale(x))[kept]))
-        if residual <= SETTLED:
+        if not residual > SETTLED:
             break
         # The rest of the way, as far as there is one: to where a step changes nothing.
         x = x.copy()
@@ -182,35 +190,49 @@ def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = 
 
 
 class _Flight:
-    """The loop as a map of arrays."""
+    """The loop as a map of arrays: columns are states, each stepped by itself."""
 
     def __init__(self, loop: ClosedLoop, parameters: LoopParameters) -> None:
         self.loop, self.parameters, self.period = loop, parameters, float(parameters.period)
         self.vehicle: Vehicle = parameters.plant.vehicle
+        # A controller may be written for floats only; else all columns go through one step.
+        self.one_by_one = bool(getattr(loop.autopilot.controller, "python_only", True))
         zero = zeros()
         self.drive: Drive = quiet(Reference(zero, zero, zero, 0.0, 0.0, 0.0))
         self.template: LoopState = loop.initial(level_start(zero), self.drive, parameters)
+        self.start: Array = np.array([[float(leaf)] for leaf in flatten(self.template)])
 
-    def start(self) -> Array:
-        return _floats(self.template)
+    def advance(self, X: Array, added: Array | None = None) -> tuple[Array, Array]:
+        """States after a period with wrenches added at the plant's input, and the wrenches that were asked for.
 
-    def advance(self, x: Array, added: Array | None = None) -> tuple[Array, Array]:
-        """State after a period with a wrench added at the plant's input, and the wrench that was asked for."""
-        state: LoopState = unflatten(self.template, x.tolist())
+        Parameters
+        ----------
+        X : (states, N) float
+        added : (4, N) float, N and N m
+        """
+        count = X.shape[1]
+        if self.one_by_one or count == 1:
+            pieces = [
+                self._step(X[:, k].tolist(), None if added is None else added[:, k].tolist()) for k in range(count)
+            ]
+            after, asked = (np.array(part, dtype=float).T for part in zip(*pieces, strict=True))
+            return after, asked
+        rows = self._step(list(X), None if added is None else list(added))
+        after, asked = (np.array([np.broadcast_to(row, count) for row in part]) for part in rows)
+        return after, asked
+
+    def _step(self, leaves: list[Scalar], added: list[Scalar] | None) -> tuple[list[Scalar], list[Scalar]]:
+        state = unflatten(self.template, leaves)
         after, signals = self.loop.step(state, self.drive, self.parameters)
         k = self.vehicle.rotor_gain
         if added is not None:
-            extra = nominal_inverse(self.vehicle, Wrench(float(added[0]), Vec3.of(added[1:].tolist()))) / k
+            extra = nominal_inverse(self.vehicle, Wrench(added[0], Vec3.of(added[1:]))) / k
             command = Command(signals.thrust_command + extra, after.autopilot.direct_acceleration_W)
             time = state.steps * self.period
             after = after._replace(
                 plant=self.loop.plant.step(state.plant, command, time, self.parameters.plant, self.period)
             )
-        return _floats(after), _floats(wrench_of(self.vehicle, signals.thrust_command * k))
-
-
-def _floats(record: object) -> Array:
-    return np.array([float(leaf) for leaf in flatten(record)])
+        return flatten(after), flatten(wrench_of(self.vehicle, signals.thrust_command * k))
 
 
 def _scale(x: Array) -> Array:
@@ -218,8 +240,8 @@ def _scale(x: Array) -> Array:
 
 
 def _settled(flight: _Flight) -> Array:
-    """The state of least change; an unstable loop leaves its equilibrium again."""
-    x = best = flight.start()
+    """The state of least change, as a column; an unstable loop leaves its equilibrium again."""
+    x = best = flight.start
     counted = leaf_names(flight.template).index("steps")
     least = math.inf
     for _ in range(MOST_SETTLING):
@@ -240,15 +262,11 @@ def _settled(flight: _Flight) -> Array:
 def _jacobian(flight: _Flight, x: Array, step: float) -> tuple[Array, Array, list[int]]:
     """A and C for all states by central differences, and the indices of the states that act on the motion."""
     h = step * _scale(x)
-    moved, asked = [], []
-    for d in np.diag(h):
-        (above, y_above), (below, y_below) = flight.advance(x + d), flight.advance(x - d)
-        moved.append(above - below)
-        asked.append(y_above - y_below)
-    differences = np.array(moved).T
-    acts = np.abs(differences) > ROUNDING * _scale(x)[:, None]
-    A = np.where(acts, differences / (2.0 * h), 0.0)
-    return A, np.array(asked).T / (2.0 * h), _acting(acts, flight)
+    d = np.diag(h[:, 0])
+    (above, asked_above), (below, asked_below) = flight.advance(x + d), flight.advance(x - d)
+    acts = np.abs(above - below) > ROUNDING * _scale(x)
+    A = np.where(acts, (above - below) / (2.0 * h.T), 0.0)
+    return A, (asked_above - asked_below) / (2.0 * h.T), _acting(acts, flight)
 
 
 def _input(flight: _Flight, x: Array) -> Array:
@@ -256,8 +274,8 @@ def _input(flight: _Flight, x: Array) -> Array:
     vehicle = flight.vehicle
     arm = max(math.hypot(a, b) for a, b in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
     h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, vehicle.torque_ratio])
-    moved = np.array([flight.advance(x, d)[0] - flight.advance(x, -d)[0] for d in np.diag(h)]).T
-    B: Array = moved / (2.0 * h)
+    start, d = np.repeat(x, 4, axis=1), np.diag(h)
+    B: Array = (flight.advance(start, d)[0] - flight.advance(start, -d)[0]) / (2.0 * h)
     return B
 
 

@@ -326,4 +326,4 @@ def new_scenario(name: str) -> str:
     if not name or any(character in '"\\' or not character.isprintable() for character in name):
         raise InputError(f"scenario name {name!r}; allowed: printable characters without quotation marks or backslash")
     template = (resources.files("rotorfault.scenarios") / "template.txt").read_text(encoding="utf-8")
-    return template.replace("NAME", name, 1)
+    return template.replace("NAME", name)

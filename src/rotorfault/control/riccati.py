@@ -126,6 +126,7 @@ def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> tuple[Gain, Sc
         [N, X], X symmetric. Where `gain` was stabilising, so is this one, and at most as costly.
     stabilising : scalar, 1 or 0
         1 where `gain` was stabilising, told from the cost matrix being positive definite; 0 for NaN.
+        Where it was not, the new gain is not either.
     """
     W, Qp, Qd, _ = problem
     Y, K = gain
@@ -251,11 +252,9 @@ def fly(problem: AttitudeProblem, stored: Gain, steps: int) -> tuple[Gain, Scala
         raise ValueError(f"steps is {steps}; at least one Newton-Kleinman step is needed, as only it brings a test")
     gain, improved = newton_kleinman_step(problem, stored)
     for _ in range(steps - 1):
-        # The last step's test decides. Once a gain stabilises all later ones do; and where the stored one did not
-        # but a step hit upon one that does, that is as good a gain.
-        gain, improved = newton_kleinman_step(problem, gain)
-    # Rounding can pass a wild start through the step's own test (about once in 100,000 for rates far beyond flight),
-    # so what is flown has to pass a test of its own as well.
+        gain, improved = newton_kleinman_step(problem, gain)  # from a stabilising gain, all later ones stabilise
+    # But for rounding the two tests are one: a step's gain stabilises exactly where its cost matrix is positive
+    # definite. About 1 of 100,000 wild starts is ill-conditioned enough to pass the cost matrix by mistake.
     stabilising = both(improved, routh_stable(problem, gain))
     gain = select_record(stabilising, gain, guaranteed_gain(problem))
     return gain, residual(problem, gain), negated(stabilising)

@@ -7,32 +7,38 @@ dotted lines, times and units stand on every axis. matplotlib's global settings 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from rotorfault.errors import InputError
 from rotorfault.files import output_folder, write_atomically
+from rotorfault.report.detection_figure import detection_figure
 from rotorfault.report.panels import (
-    Flight,
+    REFERENCE,
+    Drawn,
     Panel,
     dashed,
+    detail,
+    draw_panel,
     flights,
     legend,
     sample,
     solid,
     timeline,
+    whole,
 )
-from rotorfault.report.style import BLACK, DPI, GREY, STYLE, new_figure
+from rotorfault.report.path_figure import path_figure
+from rotorfault.report.style import DPI, STYLE, new_figure, span
 
-DASHED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4.0, 2.2)), "linewidth": 0.9}
-THRESHOLD: dict[str, Any] = {"color": GREY, "linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.8}
-FLAG = 0.16  # opacity of the shading where a fault is declared
-NEAR_ONSET = (0.05, 0.25)  # s before the first and after the last onset in the detail of the detection
+DECADES = 12  # of V that are shown at most
 FORMATS = ("png", "svg", "pdf")
 
 
@@ -47,16 +53,20 @@ def draw(data: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     Returns
     -------
     dict of str to Figure
-        ``position``, ``attitude``, ``rotor_speeds``, ``path``, ``fault_detection`` and ``control``, 16 cm wide.
+        ``position``, ``attitude``, ``rotor_speeds``, ``path``, ``fault_detection`` and ``control``, 16 cm wide;
+        with ``control_detail``, the first seconds and the faults, where that is a small part of the flight.
 
     Raises
     ------
     InputError
-        If there is no flight, or one without records.
+        If there is no flight.
     """
     drawn = flights(data)
     with rc_context(STYLE):
-        return {name: make(drawn) for name, make in FIGURES.items()}
+        made = {name: make(drawn) for name, make in FIGURES.items()}
+        if (window := detail(drawn)) is not None:
+            made["control_detail"] = _control(drawn, window)
+    return made
 
 
 def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[str] = ("png",)) -> list[Path]:
@@ -89,29 +99,29 @@ def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[st
         for name, figure in figures.items():
             for kind in formats:
                 paths.append(folder / f"{name}.{kind}")
-                write_atomically(paths[-1], lambda path, figure=figure, kind=kind: _write(figure, path, kind))  # type: ignore[misc]
+                write_atomically(paths[-1], partial(_write, figure, kind))
     return paths
 
 
-def _write(figure: Figure, path: Path, kind: str) -> None:
+def _write(figure: Figure, kind: str, path: Path) -> None:
     # Without the date, the same flight gives the same bytes.
     undated: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     figure.savefig(path, format=kind, dpi=DPI, metadata=undated.get(kind))
 
 
-def _position(drawn: Sequence[Flight]) -> Figure:
+def _position(drawn: Sequence[Drawn]) -> Figure:
     figure = new_figure(9.5)
     reach = 10.0 if len(drawn) == 1 else 3.0
     panels = [
-        Panel(name, (solid("position", k), dashed("position_reference", k)), reach, about=("position_reference", 1.0))
+        Panel(name, (solid("position", k), dashed("position_reference", k)), reach, follows=1.0)
         for k, name in enumerate("xyz")
     ]
     timeline(figure, panels, drawn)
-    legend(figure, drawn, [sample("reference", **DASHED)])
+    legend(figure, drawn, [sample("reference", **REFERENCE)])
     return figure
 
 
-def _attitude(drawn: Sequence[Flight]) -> Figure:
+def _attitude(drawn: Sequence[Drawn]) -> Figure:
     figure = new_figure(9.5)
     # A vehicle that spins in yaw leaves the panel: the half turn either way is what can be read.
     panels = [
@@ -119,13 +129,61 @@ def _attitude(drawn: Sequence[Flight]) -> Figure:
         for k, name in enumerate(("roll", "pitch", "yaw"))
     ]
     timeline(figure, panels, drawn)
-    legend(figure, drawn, [sample("command", **DASHED | {"linewidth": 0.7})])
+    legend(figure, drawn, [sample("command", **REFERENCE | {"linewidth": 0.7})])
     return figure
 
 
-def _rotor_speeds(drawn: Sequence[Flight]) -> Figure:
+def _rotor_speeds(drawn: Sequence[Drawn]) -> Figure:
     figure = new_figure(11.5)
     rotors = [int(rotor) for rotor in drawn[0].data["rotor"].values]
-    timeline(figure, [Panel(f"rotor {r}", (solid("rotor_speed", k),)) for k, r in enumerate(rotors)], drawn, True)
+    panels = [Panel(f"rotor {rotor}", (solid("rotor_speed", k),)) for k, rotor in enumerate(rotors)]
+    timeline(figure, panels, drawn, common=True)
     legend(figure, drawn, [])
     return figure
+
+
+def _control(drawn: Sequence[Drawn], window: tuple[float, float] | None = None) -> Figure:
+    figure = new_figure(13.5)
+    angles = [r"\mathrm{roll}", r"\mathrm{pitch}", r"\mathrm{yaw}"]
+    V = Panel("V", (solid("lyapunov"),))
+    rows = [
+        [Panel("thrust", (solid("thrust_demand"),)), Panel("unallocated", (solid("thrust_unallocated"),)), V],
+        [Panel(f"$\\tau_{name}$", (solid("torque_demand", k),)) for k, name in enumerate("xyz")],
+        [Panel(f"$\\sigma_{name}$", (solid("sigma_position", k),)) for k, name in enumerate("xyz")],
+        [Panel(f"$\\sigma_{{{name}}}$", (solid("sigma_attitude", k),)) for k, name in enumerate(angles)],
+    ]
+    grid = figure.subplots(len(rows), 3, squeeze=False, sharex=True)
+    for line, panels in zip(grid, rows, strict=True):
+        for axes, panel in zip(line, panels, strict=True):
+            draw_panel(axes, panel, drawn, window or whole(drawn))
+            axes.set_ylabel(f"{panel.name} {drawn[0].unit_of(panel.curves[0].signal)}")
+    _logarithmic(grid[0, 2], drawn)
+    for axes in grid[-1]:
+        axes.set_xlabel("time (s)")
+    for column in grid.T:
+        figure.align_ylabels(column)
+    legend(figure, drawn, [])
+    return figure
+
+
+def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
+    """V on a log scale over at most `DECADES`; a V of zero throughout is said in words."""
+    values = [flight.values("lyapunov") for flight in drawn]
+    found = span([value[value > 0.0] for value in values])
+    if found is None:
+        axes.text(0.5, 0.5, "V = 0", transform=axes.transAxes, ha="center", va="bottom")
+        return
+    axes.set_yscale("log", nonpositive="mask")
+    axes.set_ylim(max(found[0], found[1] * 10.0**-DECADES) / 2.0, found[1] * 3.0)
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+FIGURES = {
+    "position": _position,
+    "attitude": _attitude,
+    "rotor_speeds": _rotor_speeds,
+    "path": path_figure,
+    "fault_detection": detection_figure,
+    "control": _control,
+}

@@ -6,7 +6,6 @@ diverging flight does near its end does not set the scale of a panel; how far it
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle, islice, product
@@ -21,6 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from rotorfault.errors import InputError
+from rotorfault.metrics import Outcome
 from rotorfault.report.style import (
     BLACK,
     COLOURS,
@@ -36,19 +36,21 @@ from rotorfault.report.style import (
     unit,
 )
 
+LINE, HANDLE = 108, 6  # characters that fit beside each other in a legend; room of a handle and a gap in characters
 REACH = 3.0  # spans by which a panel may exceed its core before it is cut
 NEAR_END = 0.98  # share of a lost flight that counts for the scale of a panel
+WIDE, THIN, ALONE = 1.7, 0.9, 1.1  # line widths in points: first and last of several flights, a single one
 BEFORE, AFTER = 1.0, 2.2  # s around fault onsets that the detail shows
 DETAIL = 0.6  # a detail must be shorter than this share of the flight
 
 
-class Flight(NamedTuple):
+class Drawn(NamedTuple):
     """A flight as it is drawn."""
 
     label: str
     data: xr.Dataset  # cut at its end
     time: Array  # s
-    lost: bool  # ended before it was meant to
+    fate: str  # how it ended before it was meant to, in a word; empty for a flight that did not
     colour: str
     line: str
     width: float  # earlier flights are wider, so that both of two equal curves are seen
@@ -58,7 +60,7 @@ class Flight(NamedTuple):
         values = np.asarray(self.data[signal].values, dtype=float)
         return values if column is None else values[:, column]
 
-    def label_of(self, signal: str) -> str:
+    def unit_of(self, signal: str) -> str:
         """Unit of a signal in brackets, as it stands on an axis."""
         return f"({unit(str(self.data[signal].attrs.get('units', '1')))})"
 
@@ -77,44 +79,43 @@ class Flight(NamedTuple):
     @property
     def threshold(self) -> float | None:
         """Loss above which the diagnosis suspects a rotor; None for a diagnosis that has none."""
-        try:
-            return float(json.loads(self.data.attrs["configuration"])["diagnosis"]["decision"]["threshold"])
-        except (KeyError, TypeError, ValueError):
-            return None
+        return float(self.data.attrs.get("threshold", 0.0)) or None
 
 
-def flights(data: xr.Dataset | Mapping[str, xr.Dataset]) -> list[Flight]:
+def flights(data: xr.Dataset | Mapping[str, xr.Dataset]) -> list[Drawn]:
     """Flights with their looks, in the order given.
 
     Raises
     ------
     InputError
-        If there is none, or one has no records.
+        If there is none.
     """
     if isinstance(data, xr.Dataset):
         data = {str(data.attrs.get("controller", "flight")): data}
     if not data:
         raise InputError("no flight to draw; give at least one")
     looks = islice(cycle((colour, line) for line, colour in product(LINES, COLOURS)), len(data))
+    widths = np.linspace(WIDE, THIN, len(data)) if len(data) > 1 else [ALONE]
     return [
-        _flight(label, flight, colour, line, 1.7 - 0.8 * k / max(len(data) - 1, 1) if len(data) > 1 else 1.1)
-        for k, ((label, flight), (colour, line)) in enumerate(zip(data.items(), looks, strict=True))
+        _drawn(label, flight, colour, line, float(width))
+        for (label, flight), (colour, line), width in zip(data.items(), looks, widths, strict=True)
     ]
 
 
-def _flight(label: str, data: xr.Dataset, colour: str, line: str, width: float) -> Flight:
+def _drawn(label: str, data: xr.Dataset, colour: str, line: str, width: float) -> Drawn:
+    if not data.sizes["time"]:
+        data = data.reindex(time=[0.0])  # lost before its first record: one record of NaN
     time = np.asarray(data["time"].values, dtype=float)
-    if not len(time):
-        raise InputError(f"flight '{label}' has no records; fly it again")
     finite = np.isfinite(data["position"].values).all(axis=1) & np.isfinite(data["attitude"].values).all(axis=1)
     # Up to the first gap: what comes after it is no flight. The first record stays, so that there is one.
-    records = max(int(np.argmin(finite)) if not finite.all() else len(time), 1)
-    end = float(data.attrs.get("end_time", math.inf))
-    step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    if math.isfinite(end):
-        records = min(records, max(int(np.searchsorted(time, end + 1e-6 * step, side="right")), 1))
-    lost = records < len(time) - 1
-    return Flight(shown(label), data.isel(time=slice(records)), time[:records], lost, colour, line, width)
+    records = len(time) if finite.all() else max(int(np.argmin(finite)), 1)
+    outcome = Outcome(str(data.attrs.get("outcome", "")), float(data.attrs.get("end_time", time[-1])))
+    kept = int((time[:records] <= outcome.time * (1.0 + 1e-9)).sum())
+    fate = "lost" if records < len(time) else ""
+    if outcome.kind and not outcome.survived:
+        fate = outcome.kind
+    records = max(kept, 1)
+    return Drawn(shown(label), data.isel(time=slice(records)), time[:records], fate, colour, line, width)
 
 
 class Curve(NamedTuple):
@@ -131,8 +132,9 @@ class Panel(NamedTuple):
 
     name: str
     curves: tuple[Curve, ...]  # the first is the flight's own, and gets the mark of its end
-    reach: float | None = REACH  # None: never cut
-    core: float | None = None  # limits that count as core, as plus and minus this number
+    reach: float = REACH
+    core: float | None = None  # plus and minus what the panel is meant to show at least to be cut beyond it
+    follows: float | None = None  # least span where the second curve and the starts are what sets the scale
 
 
 def solid(signal: str, column: int | None = None) -> Curve:
@@ -145,47 +147,53 @@ def dashed(signal: str, column: int | None = None, width: float = 0.9, shared: b
     return Curve(signal, column, {"linestyle": (0, (4.0, 2.2)), "linewidth": width, "zorder": 2.6}, shared)
 
 
-def draw_panel(axes: Axes, panel: Panel, drawn: Sequence[Flight], window: tuple[float, float]) -> None:
+def draw_panel(axes: Axes, panel: Panel, drawn: Sequence[Drawn], window: tuple[float, float]) -> None:
     """Draw the curves of a panel in a window of time, set its limits, mark fault onsets and ends of flights."""
     parts: list[Array] = []
-    core: list[Array] = [] if panel.core is None else [np.array([-panel.core, panel.core])]
-    own = panel.curves[0]
-    for curve in reversed(panel.curves):
+    for curve in panel.curves:
         once = curve.shared and _agree(drawn, curve)
         # The longest flight stands for all.
         for flight in [max(drawn, key=lambda f: f.end)] if once else drawn:
-            inside = (flight.time >= window[0]) & (flight.time <= window[1])
-            time, values = flight.time[inside], flight.values(curve.signal, curve.column)[inside]
-            colour = BLACK if once or (curve.shared and len(drawn) == 1) else flight.colour
-            if curve.shared and not once and len(drawn) > 1:
-                colour = _darker(colour)
+            time, values = _inside(flight, curve, window)
+            colour = BLACK if once else _darker(flight.colour) if curve.shared else flight.colour
             style = {"color": colour, "linestyle": flight.line, "linewidth": flight.width} | curve.style
             axes.plot(*envelope(time, values), **style)
             parts.append(values)
-            if panel.core is None:
-                core.append(values[: max(int(NEAR_END * len(values)), 1)] if flight.lost else values)
-    _limit(axes, parts, core, panel.reach)
+    _limit(axes, parts, _core(panel, drawn, window), panel.reach)
     for flight in drawn:
-        _mark_end(axes, flight, own, window)
+        _mark_end(axes, flight, panel.curves[0], window)
     axes.set_xlim(*window)
+    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     mark_onsets(axes, drawn, window)
 
 
-def _agree(drawn: Sequence[Flight], curve: Curve) -> bool:
-    """Whether a curve is the same in all flights while both fly."""
-    if len({flight.time[1] - flight.time[0] for flight in drawn if len(flight.time) > 1}) > 1:
-        longest = max(drawn, key=lambda f: f.end)
-        return all(
-            np.allclose(
-                np.interp(f.time, longest.time, longest.values(curve.signal, curve.column)),
-                f.values(curve.signal, curve.column),
-                atol=1e-3,
-            )
-            for f in drawn
-        )
-    shortest = min(len(flight.time) for flight in drawn)
-    first, *others = (flight.values(curve.signal, curve.column)[:shortest] for flight in drawn)
-    return all(np.allclose(first, other, rtol=1e-6, atol=1e-9, equal_nan=True) for other in others)
+def _inside(flight: Drawn, curve: Curve, window: tuple[float, float]) -> tuple[Array, Array]:
+    # Samples just outside the window are drawn as well, so that curves reach its edges.
+    first = max(int(np.searchsorted(flight.time, window[0], side="left")) - 1, 0)
+    last = int(np.searchsorted(flight.time, window[1], side="right")) + 1
+    return flight.time[first:last], flight.values(curve.signal, curve.column)[first:last]
+
+
+def _core(panel: Panel, drawn: Sequence[Drawn], window: tuple[float, float]) -> list[Array]:
+    """The values that a panel must show in any case."""
+    if panel.core is not None:
+        return [np.array([-panel.core, panel.core])]
+    own, *others = panel.curves
+    values = [_inside(flight, own, window)[1] for flight in drawn]
+    if panel.follows is None:
+        return [v[: max(int(NEAR_END * len(v)), 1)] if f.fate else v for f, v in zip(drawn, values, strict=True)]
+    core = [_inside(flight, curve, window)[1] for flight in drawn for curve in others] + [v[:1] for v in values]
+    low, high = span(core) or (0.0, 0.0)
+    spare = max(panel.follows - (high - low), 0.0) / 2.0
+    return [np.array([low - spare, high + spare])]
+
+
+def _agree(drawn: Sequence[Drawn], curve: Curve) -> bool:
+    """Whether a curve is the same in all flights while all fly."""
+    shortest = min(drawn, key=lambda flight: flight.end)
+    seen = [np.interp(shortest.time, f.time, f.values(curve.signal, curve.column)) for f in drawn]
+    return all(np.allclose(seen[0], other, rtol=1e-6, atol=1e-9, equal_nan=True) for other in seen[1:])
 
 
 def _darker(colour: str) -> tuple[float, float, float]:
@@ -193,18 +201,16 @@ def _darker(colour: str) -> tuple[float, float, float]:
     return 0.55 * red, 0.55 * green, 0.55 * blue
 
 
-def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float | None) -> None:
+def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float) -> None:
     """Limits over all that is drawn, but not farther than `reach` spans beyond the core; say what is cut."""
     everything, middle = span(parts), span(core)
     if everything is None or middle is None:
         axes.set_ylim(-1.0, 1.0)
         return
-    low, high = everything
-    if reach is not None:
-        allowed = reach * max(middle[1] - middle[0], 1e-3 * max(map(abs, middle)), 1e-9)
-        low, high = max(low, middle[0] - allowed), min(high, middle[1] + allowed)
+    allowed = reach * max(middle[1] - middle[0], 1e-3 * max(map(abs, middle)), 1e-9)
+    low, high = max(everything[0], middle[0] - allowed), min(everything[1], middle[1] + allowed)
     axes.set_ylim(*padded(low, high))
-    note = {"transform": axes.transAxes, "ha": "right", "fontsize": 6.5, "color": "0.25", "zorder": 5}
+    note: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "fontsize": 6.5, "color": "0.25", "zorder": 5}
     back = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
     if everything[1] > high:
         axes.text(0.99, 0.97, f"up to {number(everything[1])} ↑", va="top", bbox=back, **note)
@@ -212,28 +218,29 @@ def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float | Non
         axes.text(0.99, 0.03, f"down to {number(everything[0])} ↓", va="bottom", bbox=back, **note)
 
 
-def _mark_end(axes: Axes, flight: Flight, curve: Curve, window: tuple[float, float]) -> None:
+def _mark_end(axes: Axes, flight: Drawn, curve: Curve, window: tuple[float, float]) -> None:
     values = flight.values(curve.signal, curve.column)
     finite = np.flatnonzero(np.isfinite(values))
-    if not flight.lost or not finite.size or not window[0] <= flight.end <= window[1]:
+    if not flight.fate or not finite.size or not window[0] <= flight.end <= window[1]:
         return
     low, high = axes.get_ylim()
     value = float(np.clip(values[finite[-1]], low, high))
     axes.plot(flight.time[finite[-1]], value, **END | {"color": flight.colour})
 
 
+REFERENCE: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4.0, 2.2)), "linewidth": 0.9}
 END: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.4, "clip_on": False, "linestyle": ""}
 ONSET: dict[str, Any] = {"color": BLACK, "linestyle": ":", "linewidth": 0.9}
 
 
-def mark_onsets(axes: Axes, drawn: Sequence[Flight], window: tuple[float, float]) -> None:
+def mark_onsets(axes: Axes, drawn: Sequence[Drawn], window: tuple[float, float]) -> None:
     """A thin dotted line at each fault onset in a window."""
     for time in sorted({time for flight in drawn for time in flight.onsets.values()}):
         if window[0] <= time <= window[1]:
             axes.axvline(time, zorder=1.5, **ONSET)
 
 
-def onset_label(drawn: Sequence[Flight]) -> str | None:
+def onset_label(drawn: Sequence[Drawn]) -> str | None:
     """What the legend says about the fault onsets; None if there are none."""
     found = {tuple(sorted(flight.onsets.items())) for flight in drawn if flight.onsets}
     if not found:
@@ -252,13 +259,16 @@ def onset_label(drawn: Sequence[Flight]) -> str | None:
     return f"fault onset ({'; '.join(told)})"
 
 
-def whole(drawn: Sequence[Flight]) -> tuple[float, float]:
+def whole(drawn: Sequence[Drawn]) -> tuple[float, float]:
     """The window that shows the longest flight."""
-    end = max(flight.end for flight in drawn)
-    return 0.0, end if end > 0.0 else 1.0
+    longest = max(drawn, key=lambda flight: flight.end)
+    if longest.end <= 0.0:
+        return 0.0, 1.0
+    # To the end of the last period, so that a flight of 20 s has its tick at 20 s.
+    return 0.0, longest.end + float(longest.time[-1] - longest.time[-2])
 
 
-def detail(drawn: Sequence[Flight]) -> tuple[float, float] | None:
+def detail(drawn: Sequence[Drawn]) -> tuple[float, float] | None:
     """The window of the first seconds and the faults; None where it would show most of the flight again."""
     times = [time for flight in drawn for time in flight.onsets.values()]
     first, last = (min(times), max(times)) if times else (0.0, 1.8)
@@ -268,18 +278,22 @@ def detail(drawn: Sequence[Flight]) -> tuple[float, float] | None:
     return window if window[1] <= end and window[1] - window[0] < DETAIL * end else None
 
 
-def timeline(figure: Figure, panels: Sequence[Panel], drawn: Sequence[Flight], same_scale: bool = False) -> None:
-    """Panels below each other over the whole flight, and beside them a detail of the first seconds where useful."""
+def timeline(figure: Figure, panels: Sequence[Panel], drawn: Sequence[Drawn], common: bool = False) -> None:
+    """Panels below each other over the whole flight, and beside them a detail of the first seconds where useful.
+
+    With `common`, all panels have one scale.
+    """
     close = detail(drawn)
     windows = [whole(drawn)] if close is None else [whole(drawn), close]
-    grid = figure.subplots(len(panels), len(windows), squeeze=False, sharex="col", sharey="all" if same_scale else False)
+    grid = figure.subplots(len(panels), len(windows), squeeze=False, sharex="col")
     for row, panel in zip(grid, panels, strict=True):
         for axes, window in zip(row, windows, strict=True):
             draw_panel(axes, panel, drawn, window)
-            axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
             if close is not None and axes is row[0]:
                 axes.axvspan(*close, color=LIGHT, linewidth=0.0, zorder=0.5)
-        row[0].set_ylabel(f"{panel.name} {drawn[0].label_of(panel.curves[0].signal)}")
+        row[0].set_ylabel(f"{panel.name} {drawn[0].unit_of(panel.curves[0].signal)}")
+    if common:
+        one_scale(grid.flat)
     if close is not None:
         grid[0, 0].set_title("whole flight")
         grid[0, 1].set_title(f"shaded part, {close[0]:g} s to {close[1]:g} s")
@@ -288,21 +302,45 @@ def timeline(figure: Figure, panels: Sequence[Panel], drawn: Sequence[Flight], s
     figure.align_ylabels(grid[:, 0])
 
 
+def one_scale(panels: Iterable[Axes]) -> None:
+    """Give panels the limits that hold all of them."""
+    panels = list(panels)
+    limits = [axes.get_ylim() for axes in panels]
+    for axes in panels:
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+
+
 def sample(label: str, **style: Any) -> Line2D:
     """A line that stands in a legend only."""
     return Line2D([], [], label=label, **style)
 
 
-def legend(figure: Figure, drawn: Sequence[Flight], others: Iterable[Artist]) -> None:
-    """A legend above the panels: flights, what else is drawn, fault onset, end of a flight."""
+def legend(
+    figure: Figure,
+    drawn: Sequence[Drawn],
+    others: Iterable[Artist],
+    own: str | None = None,
+    onset_style: Mapping[str, Any] | None = None,
+) -> None:
+    """A legend above the panels: flights, what else is drawn, fault onset, end of a flight.
+
+    `own` is what the curve of a single flight is called; the flight's label if it is None.
+    """
     handles: list[Artist] = [sample(f.label, color=f.colour, linestyle=f.line, linewidth=f.width) for f in drawn]
+    if own is not None and len(drawn) == 1:
+        handles[0].set_label(own)
     handles += others
     if (onset := onset_label(drawn)) is not None:
-        handles.append(sample(onset, **ONSET))
-    if any(flight.lost for flight in drawn):
-        colour = drawn[0].colour if len(drawn) == 1 else GREY
-        handles.append(sample("end of flight", **END | {"color": colour}))
-    # About 105 characters of the legend's font fit into a line; a handle takes the room of seven.
-    longest = max(len(str(handle.get_label())) for handle in handles)
-    columns = min(max(105 // (longest + 7), 1), len(handles))
+        handles.append(sample(onset, **(onset_style or ONSET)))
+    if lost := [flight for flight in drawn if flight.fate]:
+        text = f"{lost[0].fate} at {lost[0].end:.4g} s" if len(drawn) == 1 else "end of flight"
+        handles.append(sample(text, **END | {"color": drawn[0].colour if len(drawn) == 1 else GREY}))
+    lengths = [len(str(handle.get_label())) + HANDLE for handle in handles]
+    columns = next((n for n in range(len(handles), 1, -1) if _columns_fit(lengths, n)), 1)
     figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+
+
+def _columns_fit(lengths: Sequence[int], columns: int) -> bool:
+    # matplotlib fills a legend column by column, the first ones with one entry more.
+    parts = np.array_split(np.asarray(lengths), columns)
+    return sum(int(part.max()) for part in parts) <= LINE

@@ -27,7 +27,7 @@ CM = 1.0 / 2.54  # inch
 DPI = 150
 BUCKETS = 800  # per curve: about two per pixel of the widest panel at `DPI`
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.size": 8.0,
     "axes.labelsize": 8.0,
     "axes.titlesize": 8.0,

@@ -1,0 +1,88 @@
+"""The path of flights in space, with start, target and the places where faults set in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from rotorfault.report.panels import END, REFERENCE, Drawn, legend, sample
+from rotorfault.report.style import BLACK, GREY, Array, extremes, new_figure, span
+
+START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
+FAULT: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 4.5, "markeredgecolor": BLACK}
+TARGET: dict[str, Any] = {"linestyle": "", "marker": "*", "markersize": 9.0, "color": BLACK}
+
+
+def path_figure(drawn: Sequence[Drawn]) -> Figure:
+    """Paths in three dimensions with equal scales, and their shadows on the floor of the box."""
+    figure = new_figure(11.5)
+    axes: Any = figure.add_subplot(projection="3d")  # Axes3D has no complete type annotations
+    low, high = _box(drawn)
+    for flight in drawn:
+        path = flight.values("position")
+        outside = np.any((path < low) | (path > high), axis=1)
+        kept = np.unique(np.concatenate([extremes(path[:, k]) for k in range(3)]))
+        seen = np.where(np.asarray(outside)[:, None], np.nan, path)
+        axes.plot(*seen[kept].T, color=flight.colour, linestyle=flight.line, linewidth=flight.width, zorder=4)
+        # A shadow on the floor tells how deep the path lies.
+        axes.plot(seen[kept, 0], seen[kept, 1], low[2], color="0.8", linewidth=0.7, zorder=1)
+        axes.plot(*seen[:1].T, **START, markeredgecolor=flight.colour, zorder=6)
+        for time in sorted(set(flight.onsets.values())):
+            at = seen[int(np.searchsorted(flight.time, time))]
+            axes.plot(*at[:, None], **FAULT, markerfacecolor=flight.colour, zorder=7)
+        if flight.fate:
+            axes.plot(*seen[-1:].T, **END, color=flight.colour, zorder=7)
+    others = _targets(axes, drawn)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1.15)
+    axes.view_init(elev=24.0, azim=-56.0)
+    wide = float((high - low).max())
+    for name, one, size in zip("xyz", (axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
+        one.set_major_locator(MaxNLocator(max(2, round(6.0 * float(size) / wide)), steps=[1, 2, 2.5, 5, 10]))
+        one.set_label_text(f"{name} {drawn[0].unit_of('position')}")
+        one.pane.set_facecolor("white")
+    axes.tick_params(pad=0.0)
+    others.insert(0, sample("start", color=GREY, **START))
+    legend(figure, drawn, others, onset_style=FAULT | {"markerfacecolor": GREY})
+    return figure
+
+
+def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
+    """Corners of the drawn space: paths and references, paths that fly far off cut."""
+    low, high = np.zeros(3), np.zeros(3)
+    reach = 10.0 if len(drawn) == 1 else 3.0
+    targets, starts = [f.values("position_reference") for f in drawn], [f.values("position")[:1] for f in drawn]
+    wanted = np.concatenate(targets + starts)
+    size = max(float(np.ptp(wanted, axis=0).max()), 1.0)
+    for k in range(3):
+        least, most = span([f.values("position", k) for f in drawn] + [wanted[:, k]]) or (0.0, 0.0)
+        least, most = max(least, wanted[:, k].min() - reach * size), min(most, wanted[:, k].max() + reach * size)
+        low[k], high[k] = least, most
+    # A path in a plane still gets a box with some depth.
+    spare = np.maximum(0.3 * (high - low).max() - (high - low), 0.0) / 2.0 + 0.04 * max((high - low).max(), 0.1)
+    return low - spare, high + spare
+
+
+def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
+    """Draw where the flights were to go: a path where the reference moves, a star where it ends."""
+    handles: list[Any] = []
+    told: set[str] = set()
+    for flight in drawn:
+        wanted = flight.values("position_reference")
+        if np.ptp(wanted, axis=0).max() > 1e-9:
+            kept = np.unique(np.concatenate([extremes(wanted[:, k]) for k in range(3)]))
+            axes.plot(*wanted[kept].T, **REFERENCE, zorder=3)
+            name, style = "reference", REFERENCE
+        else:
+            axes.plot(*wanted[-1:].T, **TARGET, zorder=5)
+            name, style = "target", TARGET
+        if name not in told:
+            told.add(name)
+            handles.append(sample(name, **style))
+    return handles
+
+

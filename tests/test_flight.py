@@ -1,0 +1,125 @@
+"""Flights from Python: what a `Flight` gives, saving and loading, repeating, comparing with golden numbers."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rotorfault as rf
+from rotorfault.telemetry import quantities
+
+GOLDEN = Path(__file__).parent / "golden"
+SHORT = {"duration": 0.5}
+REQUIRED = {
+    "outcome", "survived", "end_time", "settle_time", "position_mse", "attitude_mse", "attitude_demand_mse", "cost",
+    "tilt_max", "control_total_variation", "saturated_fraction", "detections", "false_alarms",
+    "largest_riccati_residual", "scenario", "controller", "seed", "version",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def short() -> rf.Flight:
+    return rf.fly("paper-set-point", settings=SHORT)
+
+
+def test_every_signal_has_unit_and_meaning(short: rf.Flight) -> None:
+    assert set(short.data.data_vars) == set(quantities())
+    for name, variable in short.data.data_vars.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+        assert variable.sizes["time"] == 500
+        assert np.isfinite(variable.values).all(), name
+
+
+def test_summary_has_what_is_promised_and_is_json(short: rf.Flight) -> None:
+    summary = short.summary()
+    assert set(summary) >= REQUIRED
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+    assert set(summary["settle_time"]) == {"x", "y", "z", "overall"}
+    assert "paper-set-point flown by roismc" in str(summary)
+
+
+def test_saved_flight_loads_and_repeats_to_the_last_bit(short: rf.Flight, tmp_path: Path) -> None:
+    path = short.save(tmp_path / "flight.nc")
+    loaded = rf.load(path)
+    assert loaded.data.equals(short.data)
+    assert loaded.outcome == short.outcome
+    assert loaded.summary() == short.summary()
+    again = rf.repeat(path)
+    for name in short.data.data_vars:
+        assert np.array_equal(again.data[name], short.data[name]), name
+
+
+def test_configuration_and_versions_travel_with_the_flight(short: rf.Flight) -> None:
+    tables = json.loads(short.data.attrs["configuration"])
+    assert tables["vehicle"]["mass"]["value"] == 1.77
+    assert tables["controller"]["kind"] == "roismc"
+    assert json.loads(short.data.attrs["versions"])["rotorfault"] == rf.__version__
+
+
+def test_csv_has_a_column_per_component(short: rf.Flight, tmp_path: Path) -> None:
+    path = short.to_csv(tmp_path / "flight.csv")
+    header = path.read_text().splitlines()[0].split(",")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert table.shape == (500, len(header))
+    assert {"time", "position_x", "attitude_yaw", "thrust_4", "gain_angle_roll_pitch"} <= set(header)
+    assert table[:, header.index("position_z")] == pytest.approx(short.data["position"].sel(axis="z").values, rel=1e-8)
+
+
+def test_write_leaves_nothing_else_in_the_folder(short: rf.Flight, tmp_path: Path) -> None:
+    written = short.write(tmp_path / "deep" / "folder", with_figures=False)
+    assert sorted(p.name for p in (tmp_path / "deep" / "folder").iterdir()) == ["flight.nc", "summary.json"]
+    assert json.loads(written[1].read_text())["seed"] == 0
+
+
+def test_noise_depends_on_the_seed_and_on_nothing_else() -> None:
+    noisy = {**SHORT, "sensors.kind": "noisy"}
+    one, same = (rf.fly("paper-set-point", settings=noisy, seed=7) for _ in range(2))
+    other = rf.fly("paper-set-point", settings=noisy, seed=8)
+    assert np.array_equal(one.data["position"], same.data["position"])
+    assert not np.array_equal(one.data["position"], other.data["position"])
+
+
+def test_a_tumbling_flight_ends_with_an_outcome_and_finite_numbers() -> None:
+    dead = [{"kind": "total", "rotor": 1, "time": 0.2}, {"kind": "total", "rotor": 2, "time": 0.2}]
+    flight = rf.fly("paper-set-point", settings={"fault": dead, "duration": 5.0})
+    assert not flight.outcome.survived
+    assert flight.outcome.kind in ("tumbled", "diverged")
+    assert 0.2 < flight.outcome.time < 5.0
+    assert np.isfinite(flight.data["position"].values).all()
+    assert flight.summary()["settle_time"]["overall"] is None
+
+
+def test_ground_ends_a_flight() -> None:
+    falling = [{"kind": "step", "rotor": r, "time": 0.0, "loss": 0.9} for r in (1, 2, 3, 4)]
+    flight = rf.fly("paper-set-point", settings={"fault": falling, "ground": 0.0, "duration": 5.0,
+                                                 "start.attitude": [0.0, 0.0, 0.0]})  # fmt: skip
+    assert flight.outcome.kind == "ground"
+
+
+@pytest.mark.parametrize("name", ["nominal", "faulty"])
+def test_golden_flight(name: str) -> None:
+    """One flight without and one with faults, against tables that are read by people when they change."""
+    settings = {"duration": 3.0, "record_period": 0.1}
+    if name == "nominal":
+        settings["fault"] = []
+    flight = rf.fly("paper-set-point", settings=settings)
+    table = np.loadtxt(GOLDEN / f"{name}.csv", delimiter=",", skiprows=1)
+    got = np.column_stack([flight.data["time"], flight.data["position"], flight.data["attitude"]])
+    assert got == pytest.approx(table, abs=2e-6)
+
+
+def test_flights_in_a_batch_equal_flights_alone() -> None:
+    base = rf.load_scenario("paper-set-point", SHORT)
+    scenarios = [rf.neighbour(base, seed=i) for i in range(3)]
+    together = rf.fly_all(scenarios, engine="python")
+    alone = rf.fly(scenarios[1], engine="python")
+    assert np.array_equal(together[1].data["position"], alone.data["position"])
+
+
+def test_what_differs_in_more_than_numbers_is_refused() -> None:
+    a = rf.load_scenario("paper-set-point", SHORT)
+    b = rf.load_scenario("paper-set-point", {**SHORT, "wind.kind": "none"})
+    with pytest.raises(rf.InputError, match="differs from the first in more than numbers"):
+        rf.fly_all([a, b])

@@ -1,0 +1,421 @@
+"""Hover, linearisation, margins and the sampled-data check, against closed forms and against flown loops."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from rotorfault.assembly import assemble
+from rotorfault.closed_loop import Start, quiet
+from rotorfault.control.cascade import Cascade
+from rotorfault.control.ismc import Ismc
+from rotorfault.control.protocol import CONTROLLERS
+from rotorfault.control.python_controller import PythonController
+from rotorfault.errors import InputError
+from rotorfault.geometry import Vec3, zeros
+from rotorfault.linearisation import AXES, LinearLoop, linearise
+from rotorfault.margins import Margins, margins
+from rotorfault.sampled_data import AxisGains, damping, sampled_data_check, sampled_data_warnings, sampled_poles
+from rotorfault.scenario import load_scenario
+from rotorfault.signals import Command, Measurement, Reference, Wrench
+from rotorfault.trim import hover, hover_loop, trim_report
+from rotorfault.vehicle import Vehicle, wrench_of
+
+T = 0.002
+HOVER = Reference(zeros(), zeros(), zeros(), 0.0, 0.0, 0.0)
+
+
+class Spring:
+    """Constant gains on all axes, position held in the small through the attitude; nothing remembered."""
+
+    def __init__(self, k1: float = 90.0, k2: float = 14.0) -> None:
+        self.k1, self.k2 = k1, k2
+
+    def update(self, time: float, m: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
+        g = vehicle.gravity
+        wanted = m.p_W * -1.5 + m.v_W * -2.2
+        demand = Vec3(-wanted.y / g, wanted.x / g, 0.0)
+        turn = (m.attitude - demand) * -self.k1 + m.omega_B * -self.k2
+        return Wrench(vehicle.mass * (g - 6.0 * m.p_W.z - 4.0 * m.v_W.z), turn.times(vehicle.inertia))
+
+
+def sampled(k1: float, k2: float, lag: float, period: float, drag: float = 0.0) -> tuple[np.ndarray, ...]:
+    """A double integrator behind a lag under zero-order hold: state matrix, input, feedback row."""
+    A = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, -drag, 1.0, 0.0], [0.0, 0.0, -lag, lag], [0.0, 0.0, 0.0, 0.0]])
+    held = expm(A * period)
+    return held[:3, :3], held[:3, 3], np.array([k1, k2, 0.0])
+
+
+def loop_of(A: np.ndarray, b: np.ndarray, K: np.ndarray, period: float) -> LinearLoop:
+    """One axis as the first of four; the other three idle."""
+    n = len(A)
+    B, C = np.zeros((n, 4)), np.zeros((4, n))
+    B[:, 0], C[0] = b, -K
+    return LinearLoop(A - np.outer(b, K), B, C, period, tuple("abcde"[:n]), (), 0.0)
+
+
+def radius(A: np.ndarray) -> float:
+    return float(np.max(np.abs(np.linalg.eigvals(A))))
+
+
+def spring_loop(vehicle: Vehicle, **gains: float) -> LinearLoop:
+    return linearise(*hover_loop(vehicle, PythonController(Spring(**gains)), T))
+
+
+def check_margins(linear: LinearLoop, axis: str, m: Margins) -> None:
+    """Eigenvalues of the changed loop cross the unit circle where the frequency response says."""
+    for gain, inside in ((m.gain_up, 0.999), (m.gain_down, 1.001)):
+        if 0.0 < gain < math.inf:
+            assert radius(linear.changed(axis, gain=gain * inside)) < 1.0
+            assert radius(linear.changed(axis, gain=gain / inside)) > 1.0
+    whole = math.floor(m.delay / linear.period)
+    assert radius(linear.changed(axis, delay=whole)) < 1.0
+    assert radius(linear.changed(axis, delay=whole + 1)) > 1.0
+
+
+# -------------------------------------------------------------------------------------------------------------- hover
+
+
+def test_hover_carries_the_weight(paper_vehicle: Vehicle) -> None:
+    h = hover(paper_vehicle)
+    assert h.thrust.r1 == pytest.approx(1.77 * 9.81 / 4.0)
+    assert h.rotor_speed.r3 == pytest.approx(math.sqrt(4.3409 / 2.98e-6), rel=1e-4)
+    assert h.thrust_margin == pytest.approx(2.0, rel=1e-3)
+    assert h.tilt == 0.0
+    # Roll: two rotors at the arm's end, up to the nearer limit, which is thrust_max here (8.68 - 4.341 < 4.341).
+    assert h.torque_max.x == pytest.approx(2.0 * 0.42 * (8.68 - 1.77 * 9.81 / 4.0))
+    assert h.torque_max.z == pytest.approx(4.0 * 0.114 / 2.98 * (8.68 - 1.77 * 9.81 / 4.0))
+
+
+def test_hover_in_wind_leans_into_it(paper_vehicle: Vehicle) -> None:
+    h = hover(paper_vehicle, Vec3(-3.33, 1.36, 0.0))
+    weight = 1.77 * 9.81
+    # The paper's residual angles (section 5.1), on which drag and wind are calibrated.
+    assert (h.attitude.x, h.attitude.y) == (pytest.approx(0.011, abs=5e-4), pytest.approx(0.027, abs=5e-4))
+    assert h.tilt == pytest.approx(math.atan(0.141 * math.hypot(3.33, 1.36) / weight))
+    assert h.thrust.sum() == pytest.approx(weight / math.cos(h.tilt))
+
+
+def test_hover_of_a_vehicle_too_heavy(paper_vehicle: Vehicle) -> None:
+    h = hover(paper_vehicle._replace(mass=4.0))
+    assert h.thrust_margin < 1.0
+    assert h.torque_max == Vec3(0.0, 0.0, 0.0)
+
+
+# ------------------------------------------------------------------------------------------------------ linearisation
+
+
+@pytest.fixture(scope="module")
+def spring(paper_vehicle: Vehicle) -> LinearLoop:
+    return spring_loop(paper_vehicle)
+
+
+def test_poles_of_constant_gains_are_known(paper_vehicle: Vehicle, spring: LinearLoop) -> None:
+    """Yaw, and height with its drag, are double integrators behind the lag; x and y are the same as each other."""
+    w0, drag = paper_vehicle.rotor_bandwidth, paper_vehicle.linear_drag / paper_vehicle.mass
+    poles = spring.poles
+    assert spring.stable
+    for A, b, K in (sampled(90.0, 14.0, w0, T), sampled(6.0, 4.0, w0, T, drag)):
+        for z in np.linalg.eigvals(A - np.outer(b, K)):
+            assert np.min(np.abs(poles - z)) < 1e-7
+            s = np.log(z + 0j) / T
+            assert np.min(np.abs(spring.continuous_poles - s)) < 1e-4
+    # Translation: five integrations and a lag, of the linear plant g theta.
+    A = np.diag([1.0, 1.0, 1.0, 1.0, 0.0], 1)[:6, :6]
+    A[1, 1], A[1, 2], A[4, 4], A[4, 5] = -drag, 9.81, -w0, w0
+    A[5] = 0.0
+    held = expm(A * T)
+    K = np.array([1.5 / 9.81 * 90.0, 2.2 / 9.81 * 90.0, 90.0, 14.0, 0.0])
+    for z in np.linalg.eigvals(held[:5, :5] - np.outer(held[:5, 5], K)):
+        assert np.sum(np.abs(poles - z) < 1e-6) >= 2
+
+
+def test_what_does_not_act_is_left_out(spring: LinearLoop) -> None:
+    assert {"steps", "autopilot.elapsed", "autopilot.previous.p_W.x"} <= set(spring.left_out)
+    assert not [name for name in spring.left_out if name.startswith("plant.")]
+    assert spring.residual < 1e-10
+
+
+def test_a_riccati_gain_is_left_out_and_a_surface_kept(paper_vehicle: Vehicle) -> None:
+    kind = CONTROLLERS["roismc"]
+    linear = linearise(*hover_loop(paper_vehicle, kind(kind.Settings()), 0.001))
+    assert "autopilot.control.attitude.gain.Y.xx" in linear.left_out
+    assert "autopilot.control.attitude.surface.nominal_rate.x" in linear.names
+    for axis, m in margins(linear).items():
+        check_margins(linear, axis, m)
+
+
+def test_floats_and_arrays_linearise_alike(paper_vehicle: Vehicle) -> None:
+    kind = CONTROLLERS["ismc"]
+    together = linearise(*hover_loop(paper_vehicle, kind(kind.Settings()), T))
+    controller = kind(kind.Settings())
+    controller.python_only = True
+    one_by_one = linearise(*hover_loop(paper_vehicle, controller, T))
+    assert one_by_one.names == together.names
+    np.testing.assert_allclose(one_by_one.A, together.A, atol=1e-8)
+    np.testing.assert_allclose(one_by_one.B, together.B, atol=1e-8, rtol=1e-8)
+
+
+def test_an_offset_hover_is_found(paper_vehicle: Vehicle) -> None:
+    """With a true mass that the autopilot does not know, hover is lower: m' g = m (g + 6 dz)."""
+    loop, parameters = hover_loop(paper_vehicle, PythonController(Spring()), T)
+    heavy = parameters._replace(plant=parameters.plant._replace(vehicle=paper_vehicle._replace(mass=1.77 * 1.1)))
+    linear = linearise(loop, heavy)
+    assert linear.residual < 1e-9
+    A, b, K = sampled(6.0 / 1.1, 4.0 / 1.1, 50.0, T, 0.141 / 1.77 / 1.1)
+    for z in np.linalg.eigvals(A - np.outer(b, K)):
+        assert np.min(np.abs(linear.poles - z)) < 1e-5
+
+
+def test_wind_faults_and_diagnosis_of_a_scenario_are_left_out() -> None:
+    batch = assemble(load_scenario("paper-set-point", {"controller.kind": "smc"}))
+    linear = linearise(batch.loop, batch.parameters)
+    assert linear.stable
+    assert not [name for name in linear.names if "diagnosis" in name]
+
+
+def test_switching_without_derivative_is_refused(paper_vehicle: Vehicle) -> None:
+    kind = CONTROLLERS["smc"]
+    law = kind.Settings().law.model_copy(update={"switching": "discontinuous"})
+    controller = kind(kind.Settings(law=law))
+    with pytest.raises(InputError, match="no derivative"):
+        linearise(*hover_loop(paper_vehicle, controller, T))
+    report = trim_report(paper_vehicle, controller, period=T)
+    assert report.linear is None
+    assert "no derivative" in report.text()
+
+
+class Hoarder(Spring):
+    """Keeps an integral to itself."""
+
+    total = 0.0
+
+    def update(self, time: float, m: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
+        self.total += m.p_W.z
+        wrench = super().update(time, m, reference, vehicle)
+        return wrench._replace(thrust=wrench.thrust - self.total)
+
+
+def test_hidden_state_is_refused_and_not_disturbed(paper_vehicle: Vehicle) -> None:
+    hoarder = Hoarder()
+    with pytest.raises(InputError, match="state of its own"):
+        linearise(*hover_loop(paper_vehicle, PythonController(hoarder), T))
+    assert hoarder.total == 0.0
+
+
+# ------------------------------------------------------------------------------------------------------------ margins
+
+
+def test_gain_margin_of_a_sampled_double_integrator_is_known() -> None:
+    """Jury's condition at z = -1 for u = -k1 e - k2 e_dot: stable up to a gain of 2 / (k2 T)."""
+    A, b = np.array([[1.0, T], [0.0, 1.0]]), np.array([0.5 * T * T, T])
+    m = margins(loop_of(A, b, np.array([100.0, 20.0]), T))["thrust"]
+    assert m.gain_up == pytest.approx(2.0 / (20.0 * T), rel=1e-9)
+    assert m.gain_down == 0.0
+
+
+def test_delay_and_phase_margin_agree_with_the_continuous_loop() -> None:
+    """L = (k2 s + k1) w0 / (s^2 (s + w0)) at a period so short that sampling is half a period of delay."""
+    k1, k2, w0, period = 100.0, 14.0, 80.0, 1e-4
+    w = np.geomspace(1.0, 100.0, 200_001)
+    L = (k2 * 1j * w + k1) * w0 / ((1j * w) ** 2 * (1j * w + w0))
+    at = int(np.argmin(np.abs(np.abs(L) - 1.0)))
+    phase = math.pi + float(np.angle(L[at]))
+    m = margins(loop_of(*sampled(k1, k2, w0, period), period))["thrust"]
+    assert m.crossover == pytest.approx(w[at], rel=1e-3)
+    assert m.phase == pytest.approx(phase - 0.5 * period * w[at], rel=1e-3)
+    assert m.delay == pytest.approx(phase / w[at] - 0.5 * period, rel=1e-3)
+
+
+@pytest.mark.parametrize(("k1", "k2", "lag"), [(90.0, 14.0, 50.0), (400.0, 20.0, 50.0), (30.0, 2.0, 300.0)])
+def test_margins_are_where_the_poles_cross(k1: float, k2: float, lag: float) -> None:
+    linear = loop_of(*sampled(k1, k2, lag, T), T)
+    assert linear.stable
+    check_margins(linear, "thrust", margins(linear)["thrust"])
+
+
+def test_a_triple_integrator_has_a_lower_gain_margin() -> None:
+    """u = -k0 int e - k1 e - k2 e_dot, unsampled: stable for gains above k0 / (k1 k2)."""
+    period, k0, k1, k2 = 1e-4, 100.0, 50.0, 10.0
+    held = expm(np.diag([1.0, 1.0, 1.0], 1) * period)
+    linear = loop_of(held[:3, :3], held[:3, 3], np.array([k0, k1, k2]), period)
+    m = margins(linear)["thrust"]
+    assert m.gain_down == pytest.approx(k0 / (k1 * k2), rel=2e-2)
+    check_margins(linear, "thrust", m)
+
+
+def test_all_axes_of_a_vehicle(spring: LinearLoop) -> None:
+    found = margins(spring)
+    for axis in AXES:
+        check_margins(spring, axis, found[axis])
+    assert found["roll"].gain_down > 0.0, "position is closed through roll"
+    assert found["yaw"].gain_down == 0.0
+    # Yaw is the plain double integrator behind the lag.
+    alone = margins(loop_of(*sampled(90.0, 14.0, 50.0, T), T))["thrust"]
+    assert found["yaw"].delay == pytest.approx(alone.delay, rel=1e-6)
+    assert found["yaw"].gain_up == pytest.approx(alone.gain_up, rel=1e-6)
+
+
+def test_an_unstable_loop_has_no_margins(paper_vehicle: Vehicle) -> None:
+    linear = spring_loop(paper_vehicle, k1=3000.0, k2=3.0)
+    assert not linear.stable
+    assert all(math.isnan(m.delay) for m in margins(linear).values())
+
+
+def test_the_delay_margin_holds_in_flight(paper_vehicle: Vehicle) -> None:
+    """The true, nonlinear loop with the demanded yaw torque late by just less, and just more, than the margin."""
+    loop, parameters = hover_loop(paper_vehicle, PythonController(Spring()), T)
+    linear = linearise(loop, parameters)
+    whole = math.floor(margins(linear)["yaw"].delay / T)
+    sign = paper_vehicle.rotor_yaw_sign
+
+    def swing(delay: int) -> tuple[float, float]:
+        """Largest yaw in the second and in the last second of five."""
+        state = loop.initial(Start(zeros(), zeros(), Vec3(0.0, 0.0, 0.01), zeros()), quiet(HOVER), parameters)
+        asked, yaws = [0.0] * delay, []
+        for k in range(round(5.0 / T)):
+            after, signals = loop.step(state, quiet(HOVER), parameters)
+            asked.append(wrench_of(paper_vehicle, signals.thrust_command).torque_B.z)
+            change = sign * ((asked[-1 - delay] - asked[-1]) / (4.0 * paper_vehicle.torque_ratio))
+            late = Command(signals.thrust_command + change, zeros())
+            state = after._replace(plant=loop.plant.step(state.plant, late, k * T, parameters.plant, T))
+            yaws.append(abs(signals.attitude.z))
+        second = round(1.0 / T)
+        return max(yaws[second : 2 * second]), max(yaws[-second:])
+
+    early, late = swing(whole - 1)
+    assert late < 0.8 * early
+    early, late = swing(whole + 2)
+    assert late > 1.25 * early
+
+
+# ------------------------------------------------------------------------------------------------- sampled-data check
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_sampled_poles_are_those_of_the_matrix_exponential(direct: bool) -> None:
+    lag, period = 50.0, 0.004
+    if direct:
+        A, b, K = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period]), np.array([90.0, 14.0])
+    else:
+        A, b, K = sampled(90.0, 14.0, lag, period)
+    expected = np.sort_complex(np.linalg.eigvals(A - np.outer(b, K)))
+    found = np.sort_complex(sampled_poles(AxisGains("roll", 90.0, 14.0, direct), period, lag))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_damping() -> None:
+    zeta, omega, period = 0.3, 20.0, 0.01
+    s = omega * complex(-zeta, math.sqrt(1.0 - zeta * zeta))
+    assert damping(np.exp(np.array([s, s.conjugate(), -5.0]) * period)) == pytest.approx(zeta)
+    assert damping(np.array([0.5 + 0j, 1.01 + 0j])) < 0.0
+    assert damping(np.array([0.5 + 0j, 0j])) == 1.0
+
+
+def test_weights_in_torque_units_are_warned_of() -> None:
+    """R = 0.0088 on torque is 0.0088 J^2 on acceleration: the pole of B = 1/I_x at -4935 rad/s."""
+    J = load_scenario("paper-set-point").vehicle.vehicle.inertia
+    scenario = load_scenario(
+        "paper-set-point",
+        {
+            "controller.kind": "sdre",
+            "controller.preset": "none",
+            "controller.law.attitude_q_angle": [1.0, 1.0, 1.0],
+            "controller.law.attitude_q_rate": [1.0, 1.0, 1.0],
+            "controller.law.attitude_r": [0.0088 * moment * moment for moment in J],
+        },
+    )
+    warnings = sampled_data_warnings(scenario)
+    assert [line.split()[0] for line in warnings] == ["roll", "pitch", "yaw"]
+    assert "-4935 rad/s" in warnings[0]
+    assert "|p| T = 4.9" in warnings[0]
+    assert "unstable" in warnings[0]
+
+
+@pytest.mark.parametrize("kind", ["roismc", "smc", "ismc", "sdre"])
+def test_default_presets_are_not_warned_of(kind: str) -> None:
+    assert sampled_data_warnings(load_scenario("paper-set-point", {"controller.kind": kind})) == []
+
+
+def test_slow_sampling_and_slow_rotors_are_warned_of(paper_vehicle: Vehicle) -> None:
+    kind = CONTROLLERS["ismc"]
+    controller = kind(kind.Settings())
+    slow = paper_vehicle._replace(rotor_bandwidth=7.0)
+    assert sampled_data_check(controller, paper_vehicle, 0.001) == []
+    for lines in (sampled_data_check(controller, paper_vehicle, 0.1), sampled_data_check(controller, slow, 0.001)):
+        assert any("roll" in line for line in lines)
+
+
+def test_the_warning_is_right_about_the_whole_loop(paper_vehicle: Vehicle) -> None:
+    """Where the axis alone is unstable, so is the linearised flight; sdre has no part but its nominal gains."""
+    kind = CONTROLLERS["sdre"]
+    slow = paper_vehicle._replace(rotor_bandwidth=6.0)
+    weights = kind.Settings().law.model_copy(update={"attitude_q_angle": (100.0, 100.0, 100.0)})
+    controller = kind(kind.Settings(law=weights))
+    assert len([line for line in sampled_data_check(controller, slow, 0.001) if "unstable" in line]) >= 1
+    assert not linearise(*hover_loop(slow, controller, 0.001)).stable
+
+
+def test_six_inputs_bypass_the_rotors() -> None:
+    """With a tiny error floor the position gains explode at the target only where something lags behind them."""
+    settings: dict[str, object] = {
+        "controller.kind": "sdre",
+        "controller.preset": "none",
+        "controller.law.error_floor": [1e-3, 1e-3, 0.1],
+    }
+    lagging = sampled_data_warnings(load_scenario("paper-set-point", settings))
+    assert any(line.startswith("x at the target") for line in lagging)
+    settings["controller.cascade.six_inputs"] = True
+    direct = sampled_data_warnings(load_scenario("paper-set-point", settings))
+    assert not any(line.startswith(("x ", "y ")) for line in direct)
+
+
+def test_a_controller_that_reports_nothing_is_not_stepped(paper_vehicle: Vehicle) -> None:
+    hoarder = Hoarder()
+    assert sampled_data_check(PythonController(hoarder), paper_vehicle, 0.001) == []
+    assert hoarder.total == 0.0
+
+
+# ------------------------------------------------------------------------------------------------------------- report
+
+
+def test_the_report_reads_well() -> None:
+    text = trim_report("paper", "smc").text()
+    for part in ("4.341 N", "rad/s", "Closed-loop poles", "damping", "gain up", "delay [ms]", *AXES):
+        assert part in text
+    assert "nan" not in text
+    assert max(len(line) for line in text.splitlines()) <= 110
+
+
+def test_a_report_on_an_unstable_loop_says_so(paper_vehicle: Vehicle) -> None:
+    report = trim_report(paper_vehicle, PythonController(Spring(k1=3000.0, k2=3.0)), period=T)
+    assert "not stable in hover" in "".join(report.warnings)
+    assert "Margins: none" in report.text()
+
+
+@pytest.mark.parametrize("wrong", [{"controller": "pid"}, {"preset": "no"}, {"period": 0.0}, {"period": math.nan}])
+def test_wrong_input_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="allowed"):
+        trim_report("paper", **wrong)  # type: ignore[arg-type]
+
+
+def test_gains_at_the_start_are_checked(paper_vehicle: Vehicle) -> None:
+    """A position law that is fast far away only, as SDRE with Q growing with the error."""
+
+    class Far(Cascade):
+        def step(self, memory: Any, inputs: Any, parameters: Any, dt: float) -> Any:
+            after, output = super().step(memory, inputs, parameters, dt)
+            far = 1.0 + 1e3 * inputs.measurement.p_W.z
+            told = output.telemetry
+            return after, output._replace(telemetry=told._replace(gain_position=told.gain_position * far))
+
+    settings = CONTROLLERS["ismc"].Settings()
+    controller = Far(Ismc(settings.law), settings.cascade)
+    start = Measurement(Vec3(0.0, 0.0, 5.0), zeros(), zeros(), zeros())
+    assert sampled_data_check(controller, paper_vehicle, 0.001) == []
+    lines = sampled_data_check(controller, paper_vehicle, 0.001, start)
+    assert any(line.startswith("z at the start") for line in lines)

@@ -1,0 +1,259 @@
+"""The tables of docs/ that repeat what the code knows: settings, keys of files, signals.
+
+    python tools/settings_tables.py                     print every table with its name
+    python tools/settings_tables.py controllers/smc     print one
+    python tools/settings_tables.py --write             bring all tables in docs/ up to date
+
+In a page, a table stands between the lines ``<!-- table: NAME -->`` and ``<!-- end of table -->``. Whatever stands
+between them is replaced; tests/test_docs.py compares it with the code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from rotorfault.catalogue import REGISTRIES
+from rotorfault.control.cascade import CascadeSettings
+from rotorfault.geometry import Mat3, PerRotor, Vec3
+from rotorfault.scenario import Mismatch, Part, Scenario, Start
+from rotorfault.telemetry import RPY, quantities
+from rotorfault.vehicle_file import Rotor, VehicleFile, load_vehicle
+
+DOCS = Path(__file__).parents[1] / "docs"
+BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
+__all__ = ["BLOCK", "DOCS", "Setting", "settings", "tables", "updated"]
+
+
+class Setting(NamedTuple):
+    """One key of a configuration."""
+
+    key: str
+    default: str
+    allowed: str
+    unit: str
+    meaning: str
+
+
+def settings(model: type[BaseModel], prefix: str = "") -> Iterator[Setting]:
+    """All keys of a model with those of the models inside it, dotted; lists of models as ``name[].key``."""
+    for name, field in model.model_fields.items():
+        inner, many = _inner(field.annotation)
+        if inner is None:
+            yield _setting(prefix + name, field)
+        elif many or field.default is None:
+            # The table or list itself may be left out, which its own row says.
+            yield _setting(prefix + name, field)
+            yield from settings(inner, f"{prefix}{name}{'[]' if many else ''}.")
+        else:
+            defaults = None if field.is_required() else field.get_default(call_default_factory=True)
+            for setting in settings(inner, f"{prefix}{name}."):
+                if isinstance(defaults, BaseModel):
+                    # What counts is the default of the outer model, which fills the inner one.
+                    value = defaults
+                    for part in setting.key.removeprefix(f"{prefix}{name}.").split("."):
+                        value = getattr(value, part, PydanticUndefined)
+                    setting = setting if value is PydanticUndefined else setting._replace(default=_value(value))
+                yield setting
+
+
+def _inner(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
+    """The model that an annotation stands for, and whether it is a list of them."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation, False
+    arguments = [a for a in get_args(annotation) if a is not type(None) and a is not Ellipsis]
+    if len(arguments) == 1 and isinstance(arguments[0], type) and issubclass(arguments[0], BaseModel):
+        return arguments[0], get_origin(annotation) is tuple
+    return None, False
+
+
+def _setting(key: str, field: FieldInfo) -> Setting:
+    default = "required" if field.is_required() else _value(field.get_default(call_default_factory=True))
+    text = " ".join((field.description or key.rpartition(".")[2].replace("_", " ")).split())
+    brackets = re.findall(r"\s*\[[^\]]*\]", text)
+    unit = ""
+    if len(brackets) == 1:
+        unit = brackets[0].strip()[1:-1]
+        text = text.replace(brackets[0], "", 1).strip().removeprefix(", ")
+    return Setting(key, default, _allowed(field), "" if unit in ("1", "-") else unit, text)
+
+
+def _value(value: Any) -> str:
+    """A default as it would stand in a TOML file."""
+    if value is None:
+        return "not given"
+    if isinstance(value, Part):
+        return f"`{value.kind}`"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    if isinstance(value, tuple):
+        return f"`[{', '.join(_number(x) for x in value)}]`"
+    return f"`{_number(value)}`"
+
+
+def _number(value: Any) -> str:
+    text = repr(value)
+    large = isinstance(value, float) and value >= 1e5
+    return re.sub(r"e\+0*", "e", f"{value:.0e}") if large else text
+
+
+def _allowed(field: FieldInfo) -> str:
+    """Type and range in a few words."""
+    kind = field.annotation
+    options = [a for a in get_args(kind) if a is not type(None)]
+    if get_origin(kind) is Literal:
+        return ", ".join(f"`{option}`" for option in options)
+    if get_origin(kind) in (Union, types.UnionType) and len(options) == 1:
+        kind, options = options[0], []
+    bounds = _bounds(field.metadata)
+    if kind is bool:
+        return "`true`, `false`"
+    if kind is str:
+        return "text"
+    if kind is int:
+        return f"whole number{bounds}"
+    if kind is float:
+        return f"number{bounds}"
+    if get_origin(kind) is tuple and Ellipsis not in options and options:
+        metadata = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
+        return f"{len(options)} numbers{_bounds(metadata)}"
+    if get_origin(kind) is tuple:
+        return "list of tables"
+    return "table" if _inner(field.annotation)[0] else ""
+
+
+def _bounds(metadata: list[Any]) -> str:
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    found = {name: getattr(m, name) for name in signs for m in metadata if getattr(m, name, None) is not None}
+    if set(found) == {"ge", "le"}:
+        return f", {found['ge']:g} to {found['le']:g}"
+    return ",".join(f" {signs[name]} {value:g}" for name, value in found.items())
+
+
+# ------------------------------------------------------------------------------------------------------------- tables
+
+
+def tables() -> dict[str, str]:
+    """Every table under its name, as Markdown."""
+    found: dict[str, str] = {}
+    for group, registry in REGISTRIES.items():
+        for kind, part in registry.items():
+            model = getattr(part, "Settings", None)
+            if model is None:
+                continue
+            own = model.model_fields.get("law") if group == "controllers" else None
+            rows = settings(own.annotation, "law.") if own is not None else settings(model)
+            found[f"{group}/{kind}"] = _settings_table(list(rows))
+    found["cascade"] = _settings_table(list(settings(CascadeSettings, "cascade.")))
+    found["scenario"] = _settings_table(list(_scenario()))
+    found["vehicle"] = _vehicle_table()
+    found["signals"] = _signals_table()
+    return found
+
+
+def _settings_table(rows: list[Setting]) -> str:
+    if not rows:
+        return "Nothing to set.\n"
+    header = ["key", "default", "allowed", "unit", "meaning"]
+    return _markdown(header, [[f"`{row.key}`", *row[1:]] for row in rows])
+
+
+def _scenario() -> Iterator[Setting]:
+    parts = {"reference", "wind", "fault", "sensors", "controller", "diagnosis", "allocation"}
+    inside = {"start": Start, "mismatch": Mismatch}
+    for name, field in Scenario.model_fields.items():
+        if name in inside:
+            for setting in settings(inside[name], f"{name}."):
+                factor = f"factor on the true {setting.meaning}" if name == "mismatch" else setting.meaning
+                yield setting._replace(meaning=factor)
+        elif name in parts:
+            default = "required" if field.is_required() else "none" if name == "fault" else f"`{field.default}`"
+            allowed = "list of tables with `kind`" if name == "fault" else "table with `kind`, or a bare name"
+            yield Setting(name, default, allowed, "", field.description or "")
+        elif name == "vehicle":
+            yield Setting(name, "required", "name, path, or a vehicle's tables", "", "the vehicle")
+        elif name == "plant":
+            names = ", ".join(f"`{plant}`" for plant in REGISTRIES["plants"])
+            yield Setting(name, _value(field.default), names, "", "model of the body")
+        else:
+            yield _setting(name, field)
+
+
+def _vehicle_table() -> str:
+    units = {key: quantity.unit for key, quantity in load_vehicle("paper").quantities()}
+    rows = []
+    for name, field in VehicleFile.model_fields.items():
+        if name == "rotor":
+            continue
+        unit = units.get(name, "")
+        default = "required" if field.is_required() else _value(field.default)
+        rows.append([f"`{name}`", default, unit, _without_unit(field.description or "", unit)])
+    rotor = VehicleFile.model_fields["rotor"]
+    rows.append(["`[[rotor]]`", "required", "", rotor.description or ""])
+    for name, field in Rotor.model_fields.items():
+        unit = units.get(f"rotor.1.{name}", "")
+        default = "required" if field.is_required() else _value(field.default)
+        text = (field.description or "").removesuffix(f", {unit}")
+        rows.append([f"`rotor.{name}`", default, unit, text])
+    return _markdown(["key", "default", "unit", "meaning"], rows)
+
+
+def _without_unit(text: str, unit: str) -> str:
+    text = text.removeprefix(unit).removeprefix(", ") if unit and unit != "1" else text
+    return text or "acceleration of free fall"
+
+
+def _signals_table() -> str:
+    rows = []
+    for name, (kind, about) in quantities().items():
+        angular = "angle" if about.frame == RPY else "axis"
+        dims = {Vec3: angular, PerRotor: "rotor", Mat3: "angle, angle_2"}.get(kind, "")
+        frame = "angles" if about.frame == RPY else about.frame.partition(":")[0]
+        rows.append([f"`{name}`", dims, "" if about.unit == "1" else about.unit, frame, about.meaning])
+    return _markdown(["signal", "over time and", "unit", "frame", "meaning"], rows)
+
+
+def _markdown(header: list[str], rows: list[list[str]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+
+
+def updated(text: str, every: dict[str, str]) -> str:
+    """A page with all its tables as the code has them; raises KeyError for a name that there is not."""
+    return BLOCK.sub(lambda block: f"{block[1]}\n{every[block[2]]}\n{block[4]}", text)
+
+
+def main() -> None:
+    """Print tables, or write them into the pages."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="tables to print; all if none is named")
+    parser.add_argument("--write", action="store_true", help="bring the pages in docs/ up to date")
+    options = parser.parse_args()
+    every = tables()
+    unknown = [name for name in options.names if name not in every]
+    if unknown:
+        parser.error(f"no table '{unknown[0]}'; there are {', '.join(every)}")
+    if options.write:
+        for path in sorted(DOCS.rglob("*.md")):
+            before = path.read_text(encoding="utf-8")
+            after = updated(before, every)
+            if after != before:
+                path.write_text(after, encoding="utf-8")
+                print(f"updated {path.relative_to(DOCS.parent)}")
+        return
+    for name in options.names or every:
+        print(f"{name}\n\n{every[name]}")
+
+
+if __name__ == "__main__":
+    main()
