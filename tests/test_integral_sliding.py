@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rotorfault.assembly import assemble
+from rotorfault.closed_loop import quiet
 from rotorfault.config import validate
 from rotorfault.control import CONTROLLERS, integral_sliding
 from rotorfault.control.integral_sliding import SwitchingGains, SwitchingSettings
@@ -17,7 +18,6 @@ from rotorfault.control.protocol import TrackingError
 from rotorfault.control.roismc import Roismc
 from rotorfault.control.sdre import gyroscopic_drift
 from rotorfault.control.smc import SlidingParameters, Smc
-from rotorfault.closed_loop import quiet
 from rotorfault.errors import InputError
 from rotorfault.geometry import Mat3, Vec3, zeros
 from rotorfault.reference import ReferenceTable
@@ -130,12 +130,12 @@ def cases(seed: int) -> Ideal:
     )
 
 
-def ideal_run(law: Any, group: str, case: Ideal, *, start_off: bool, excess: float = 1.0, steps: int = 250) -> Any:
+def ideal_run(law: Any, group: str, case: Ideal, *, start_off: bool, excess: float = 1.0, steps: int = 100) -> Any:
     """sigma at each instant, shape (steps, 3, CASES), and the bound on |delta| there, (steps, CASES).
 
     The virtual inputs come about at once and the step is small, so that sigma' = n (u_sw + delta) to rounding.
     """
-    dt = 2e-4
+    dt = 5e-4
     parameters = law.parameters(VEHICLE, dt)._replace(**{group: case.gains})
     drift = Mat3.diagonal(zeros())
     if group == "attitude":
@@ -168,7 +168,7 @@ def ideal_run(law: Any, group: str, case: Ideal, *, start_off: bool, excess: flo
 
 
 def decrease_missing(law: Any, group: str, form: str, case: Ideal) -> Array:
-    """By how much sigma_i falls short of V_i' <= -k_i |sigma_i|, per axis and step outside the layer; <= 0 is right."""
+    """V_i' + k_i |sigma_i| of each axis and step outside the layer; it must not be above 0."""
     sigma, _, dt = ideal_run(law, group, case, start_off=True)
     before, after = sigma[:-1], sigma[1:]
     rate = (after**2 - before**2 - (after - before) ** 2) / (2.0 * dt)  # V' without what the finite step adds
@@ -207,20 +207,20 @@ def test_with_the_printed_sign_V_would_grow(
 def test_sigma_stays_in_the_layer_for_good(law: type, group: str, nominal: str) -> None:
     made, case = law(law.Settings(nominal=nominal)), cases(12)
     edge = np.abs(rows(case.gains.weight)) * case.gains.layer
-    within = ideal_run(made, group, case, start_off=False, steps=400)[0] / edge
+    within = ideal_run(made, group, case, start_off=False, steps=160)[0] / edge
     assert np.abs(within).max() <= 1.0
     assert np.abs(within).max() > 0.05, "the disturbance must be felt"
     # Three times the disturbance that the gains are made for is too much for k as well.
     weak = case._replace(gains=case.gains._replace(k=case.gains.k * 0.01))
-    beyond = ideal_run(made, group, weak, start_off=False, excess=3.0, steps=400)[0] / edge
+    beyond = ideal_run(made, group, weak, start_off=False, excess=3.0, steps=160)[0] / edge
     assert np.abs(beyond).max() > 1.0
 
 
-# --------------------------------------------------------------------------------- equilibrium behind a lagging actuator
+# ----------------------------------------------------------------------------- equilibrium behind a lagging actuator
 
 
 def lagged_run(law: Any, group: str, disturbance: Vec3, seconds: float, bandwidth: float) -> tuple[Any, Array, Array]:
-    """Last output, error at the end and sigma over time, under a constant disturbance behind an exact first-order lag."""
+    """Last output, last error and sigma over time, under a constant disturbance behind an exact lag."""
     dt = 1e-3
     parameters = law.parameters(VEHICLE, dt)
     e = rate = lagged = predicted = zeros()
@@ -262,7 +262,7 @@ def test_sigma_comes_to_rest_where_switching_balances_the_disturbance(law: type,
 def test_both_readings_of_nominal_agree_behind_a_known_lag(law: type, group: str) -> None:
     disturbance = Vec3(0.5, -0.3, 0.4)
     runs = [
-        lagged_run(law(law.Settings(nominal=nominal)), group, disturbance, 1.0, 50.0)[2]
+        lagged_run(law(law.Settings(nominal=nominal)), group, disturbance, 0.3, 50.0)[2]
         for nominal in ("achieved", "demanded")
     ]
     assert np.abs(runs[0]).max() > 1e-5
@@ -289,10 +289,9 @@ def test_integrating_the_whole_acceleration_has_no_equilibrium(monkeypatch: pyte
 @each_form
 @pytest.mark.parametrize("eta", [0.0, 3.0])
 def test_smc_reaches_its_surface_in_time(group: str, form: str, eta: float) -> None:
-    """Within sqrt(2 V0)/Lambda, with K = Lambda + the bound of the disturbance; exactly then without either excess."""
+    """Within sqrt(2 V0)/Lambda, with K = Lambda + the disturbance bound; exactly then without disturbance."""
     draw = np.random.default_rng(5)
-    dt, bound, rate_of_reaching = 2e-4, 0.8, draw.uniform(1.0, 4.0, (3, CASES))
-    layer = 0.02
+    dt, bound, layer, rate_of_reaching = 1e-3, 0.8, 0.05, draw.uniform(4.0, 12.0, (3, CASES))
     law = Smc(Smc.Settings(switching=form))
     drift = Mat3.diagonal(zeros()) if group == "position" else gyroscopic_drift(VEHICLE, Vec3(2.0, -3.0, 4.0), 50.0)
     for disturbed in (False, True):
@@ -303,7 +302,7 @@ def test_smc_reaches_its_surface_in_time(group: str, form: str, eta: float) -> N
         parameters = law.parameters(VEHICLE, dt)._replace(**{group: numbers})
         s_0 = rate + slope * e
         reached = np.full((3, CASES), np.inf)
-        for k in range(int(1.05 * np.max(np.abs(s_0) / rate_of_reaching) / dt)):
+        for k in range(int(np.max(np.abs(s_0) / rate_of_reaching) / dt) + 3):
             error = TrackingError(vec(e), vec(rate), vec(rate), zeros(), zeros(), drift, zeros())
             _, output = getattr(law, group)((), error, parameters, dt)
             here = rows(output.sigma)
@@ -317,7 +316,7 @@ def test_smc_reaches_its_surface_in_time(group: str, form: str, eta: float) -> N
         V_0 = 0.5 * np.sum(s_0 * s_0, axis=0)
         assert (reached.max(axis=0) <= np.sqrt(2.0 * V_0) / rate_of_reaching.min(axis=0) + 2.0 * dt).all()
         if eta == 0.0 and not disturbed and form == "discontinuous":
-            np.testing.assert_allclose(reached, limit, atol=1.01 * np.max(np.abs(e)) * dt + 20 * dt)
+            np.testing.assert_allclose(reached, limit, atol=1.001 * dt)
 
 
 # ---------------------------------------------------------------------------------------------------------- settings

@@ -1,9 +1,8 @@
-"""Hover, linearisation, margins and the sampled-data check, against closed forms and against flown loops."""
+"""Hover, linearisation and margins, against closed forms and against flown loops."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +10,12 @@ from scipy.linalg import expm
 
 from rotorfault.assembly import assemble
 from rotorfault.closed_loop import Start, quiet
-from rotorfault.control.cascade import Cascade
-from rotorfault.control.ismc import Ismc
 from rotorfault.control.protocol import CONTROLLERS
 from rotorfault.control.python_controller import PythonController
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3, zeros
 from rotorfault.linearisation import AXES, LinearLoop, linearise
 from rotorfault.margins import Margins, margins
-from rotorfault.sampled_data import AxisGains, damping, sampled_data_check, sampled_data_warnings, sampled_poles
 from rotorfault.scenario import load_scenario
 from rotorfault.signals import Command, Measurement, Reference, Wrench
 from rotorfault.trim import hover, hover_loop, trim_report
@@ -240,7 +236,7 @@ def test_margins_are_where_the_poles_cross(k1: float, k2: float, lag: float) -> 
 
 def test_a_triple_integrator_has_a_lower_gain_margin() -> None:
     """u = -k0 int e - k1 e - k2 e_dot, unsampled: stable for gains above k0 / (k1 k2)."""
-    period, k0, k1, k2 = 1e-4, 100.0, 50.0, 10.0
+    period, k0, k1, k2 = 2e-3, 100.0, 50.0, 10.0
     held = expm(np.diag([1.0, 1.0, 1.0], 1) * period)
     linear = loop_of(held[:3, :3], held[:3, 3], np.array([k0, k1, k2]), period)
     m = margins(linear)["thrust"]
@@ -274,110 +270,23 @@ def test_the_delay_margin_holds_in_flight(paper_vehicle: Vehicle) -> None:
     sign = paper_vehicle.rotor_yaw_sign
 
     def swing(delay: int) -> tuple[float, float]:
-        """Largest yaw in the second and in the last second of five."""
+        """Largest yaw in the second and in the last half second of two and a half."""
         state = loop.initial(Start(zeros(), zeros(), Vec3(0.0, 0.0, 0.01), zeros()), quiet(HOVER), parameters)
         asked, yaws = [0.0] * delay, []
-        for k in range(round(5.0 / T)):
+        for k in range(round(2.5 / T)):
             after, signals = loop.step(state, quiet(HOVER), parameters)
             asked.append(wrench_of(paper_vehicle, signals.thrust_command).torque_B.z)
             change = sign * ((asked[-1 - delay] - asked[-1]) / (4.0 * paper_vehicle.torque_ratio))
             late = Command(signals.thrust_command + change, zeros())
             state = after._replace(plant=loop.plant.step(state.plant, late, k * T, parameters.plant, T))
             yaws.append(abs(signals.attitude.z))
-        second = round(1.0 / T)
-        return max(yaws[second : 2 * second]), max(yaws[-second:])
+        half = round(0.5 / T)
+        return max(yaws[half : 2 * half]), max(yaws[-half:])
 
-    early, late = swing(whole - 1)
-    assert late < 0.8 * early
-    early, late = swing(whole + 2)
-    assert late > 1.25 * early
-
-
-# ------------------------------------------------------------------------------------------------- sampled-data check
-
-
-@pytest.mark.parametrize("direct", [False, True])
-def test_sampled_poles_are_those_of_the_matrix_exponential(direct: bool) -> None:
-    lag, period = 50.0, 0.004
-    if direct:
-        A, b, K = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period]), np.array([90.0, 14.0])
-    else:
-        A, b, K = sampled(90.0, 14.0, lag, period)
-    expected = np.sort_complex(np.linalg.eigvals(A - np.outer(b, K)))
-    found = np.sort_complex(sampled_poles(AxisGains("roll", 90.0, 14.0, direct), period, lag))
-    np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_damping() -> None:
-    zeta, omega, period = 0.3, 20.0, 0.01
-    s = omega * complex(-zeta, math.sqrt(1.0 - zeta * zeta))
-    assert damping(np.exp(np.array([s, s.conjugate(), -5.0]) * period)) == pytest.approx(zeta)
-    assert damping(np.array([0.5 + 0j, 1.01 + 0j])) < 0.0
-    assert damping(np.array([0.5 + 0j, 0j])) == 1.0
-
-
-def test_weights_in_torque_units_are_warned_of() -> None:
-    """R = 0.0088 on torque is 0.0088 J^2 on acceleration: the pole of B = 1/I_x at -4935 rad/s."""
-    J = load_scenario("paper-set-point").vehicle.vehicle.inertia
-    scenario = load_scenario(
-        "paper-set-point",
-        {
-            "controller.kind": "sdre",
-            "controller.preset": "none",
-            "controller.law.attitude_q_angle": [1.0, 1.0, 1.0],
-            "controller.law.attitude_q_rate": [1.0, 1.0, 1.0],
-            "controller.law.attitude_r": [0.0088 * moment * moment for moment in J],
-        },
-    )
-    warnings = sampled_data_warnings(scenario)
-    assert [line.split()[0] for line in warnings] == ["roll", "pitch", "yaw"]
-    assert "-4935 rad/s" in warnings[0]
-    assert "|p| T = 4.9" in warnings[0]
-    assert "unstable" in warnings[0]
-
-
-@pytest.mark.parametrize("kind", ["roismc", "smc", "ismc", "sdre"])
-def test_default_presets_are_not_warned_of(kind: str) -> None:
-    assert sampled_data_warnings(load_scenario("paper-set-point", {"controller.kind": kind})) == []
-
-
-def test_slow_sampling_and_slow_rotors_are_warned_of(paper_vehicle: Vehicle) -> None:
-    kind = CONTROLLERS["ismc"]
-    controller = kind(kind.Settings())
-    slow = paper_vehicle._replace(rotor_bandwidth=7.0)
-    assert sampled_data_check(controller, paper_vehicle, 0.001) == []
-    for lines in (sampled_data_check(controller, paper_vehicle, 0.1), sampled_data_check(controller, slow, 0.001)):
-        assert any("roll" in line for line in lines)
-
-
-def test_the_warning_is_right_about_the_whole_loop(paper_vehicle: Vehicle) -> None:
-    """Where the axis alone is unstable, so is the linearised flight; sdre has no part but its nominal gains."""
-    kind = CONTROLLERS["sdre"]
-    slow = paper_vehicle._replace(rotor_bandwidth=6.0)
-    weights = kind.Settings().law.model_copy(update={"attitude_q_angle": (100.0, 100.0, 100.0)})
-    controller = kind(kind.Settings(law=weights))
-    assert len([line for line in sampled_data_check(controller, slow, 0.001) if "unstable" in line]) >= 1
-    assert not linearise(*hover_loop(slow, controller, 0.001)).stable
-
-
-def test_six_inputs_bypass_the_rotors() -> None:
-    """With a tiny error floor the position gains explode at the target only where something lags behind them."""
-    settings: dict[str, object] = {
-        "controller.kind": "sdre",
-        "controller.preset": "none",
-        "controller.law.error_floor": [1e-3, 1e-3, 0.1],
-    }
-    lagging = sampled_data_warnings(load_scenario("paper-set-point", settings))
-    assert any(line.startswith("x at the target") for line in lagging)
-    settings["controller.cascade.six_inputs"] = True
-    direct = sampled_data_warnings(load_scenario("paper-set-point", settings))
-    assert not any(line.startswith(("x ", "y ")) for line in direct)
-
-
-def test_a_controller_that_reports_nothing_is_not_stepped(paper_vehicle: Vehicle) -> None:
-    hoarder = Hoarder()
-    assert sampled_data_check(PythonController(hoarder), paper_vehicle, 0.001) == []
-    assert hoarder.total == 0.0
+    early, late = swing(math.floor(0.85 * whole))
+    assert late < 0.5 * early
+    early, late = swing(math.ceil(1.15 * whole))
+    assert late > 2.0 * early
 
 
 # ------------------------------------------------------------------------------------------------------------- report
@@ -401,21 +310,3 @@ def test_a_report_on_an_unstable_loop_says_so(paper_vehicle: Vehicle) -> None:
 def test_wrong_input_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError, match="allowed"):
         trim_report("paper", **wrong)  # type: ignore[arg-type]
-
-
-def test_gains_at_the_start_are_checked(paper_vehicle: Vehicle) -> None:
-    """A position law that is fast far away only, as SDRE with Q growing with the error."""
-
-    class Far(Cascade):
-        def step(self, memory: Any, inputs: Any, parameters: Any, dt: float) -> Any:
-            after, output = super().step(memory, inputs, parameters, dt)
-            far = 1.0 + 1e3 * inputs.measurement.p_W.z
-            told = output.telemetry
-            return after, output._replace(telemetry=told._replace(gain_position=told.gain_position * far))
-
-    settings = CONTROLLERS["ismc"].Settings()
-    controller = Far(Ismc(settings.law), settings.cascade)
-    start = Measurement(Vec3(0.0, 0.0, 5.0), zeros(), zeros(), zeros())
-    assert sampled_data_check(controller, paper_vehicle, 0.001) == []
-    lines = sampled_data_check(controller, paper_vehicle, 0.001, start)
-    assert any(line.startswith("z at the start") for line in lines)

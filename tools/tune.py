@@ -197,17 +197,20 @@ def main() -> None:
         0.15,
         {"bounds": [0.0, 1.0], "popsize": arguments.population, "seed": arguments.seed, "verbose": -9},
     )
+    generation = 0
     for generation in range(arguments.generations):
-        points = search.ask()
-        costs = evaluate(points)
+        try:
+            points = search.ask()
+            costs = evaluate(points)
+        except KeyboardInterrupt:
+            break  # what was found so far is printed below
         search.tell(points, costs)
         if generation % 5 == 0:
             print(f"{generation:3d}  best {search.result.fbest:.4f}  median {np.median(costs):.4f}", flush=True)
     best = search.result.xbest
-    print(f"# CMA-ES, {arguments.generations} generations of {arguments.population}, {len(flights)} flights each,")
+    print(f"# CMA-ES, {generation + 1} generations of {arguments.population}, {len(flights)} flights each,")
     print(f"# seed {arguments.seed}, objective {search.result.fbest:.4f}")
     print(as_toml(settings(arguments.controller, values(best))))
-    print([round(s, 4) for s in (evaluate([best]))])
 
 
 def as_toml(tables: dict[str, Any], prefix: str = "tuned") -> str:

@@ -185,7 +185,7 @@ def trim(
 
     Example: rotorfault trim paper --controller smc
     """
-    typer.echo(_load("trim").trim_report(_load("vehicle_file").load_vehicle(vehicle).vehicle, controller, preset, period).text())
+    typer.echo(_load("trim").trim_report(vehicle, controller, preset, period).text())
 
 
 def main() -> None:

@@ -245,8 +245,8 @@ def _flight(scenario: Scenario, recording: Recording, index: int, engine: str, o
     found = first_loss(signals, scenario.ground)
     end = len(times)
     if found is not None:
-        # The record of the loss itself is kept where it has numbers.
-        end = found[0] + (1 if np.isfinite(signals[found[0]]).all() else 0)
+        # The record of the loss itself is kept where it has numbers, and the first in any case.
+        end = max(1, found[0] + (1 if np.isfinite(signals[found[0]]).all() else 0))
         outcome = Outcome(found[1], float(times[found[0]]))
     elif recording.interrupted:
         outcome = Outcome("interrupted", float(times[-1]))

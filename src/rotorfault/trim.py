@@ -201,7 +201,8 @@ def _loop_warnings(linear: LinearLoop, found: dict[str, Margins]) -> list[str]:
         if m.gain_up < LEAST_GAIN_MARGIN:
             lines.append(f"{axis}: gain margin {m.gain_up:.3g} ({_decibel(m.gain_up)}), below the usual 6 dB")
         if m.gain_down > 1.0 / LEAST_GAIN_MARGIN:
-            lines.append(f"{axis}: stable down to a gain of {m.gain_down:.3g} only ({_decibel(m.gain_down)}; usual -6 dB)")
+            down = f"{m.gain_down:.3g} ({_decibel(m.gain_down)})"
+            lines.append(f"{axis}: stable down to a gain of {down} only; usual: down to -6 dB")
         if m.phase < LEAST_PHASE_MARGIN:
             lines.append(f"{axis}: phase margin {math.degrees(m.phase):.3g} deg, below the usual 30 deg")
         if m.delay < linear.period:

@@ -96,7 +96,8 @@ def limited_force(f_W: Vec3, vehicle: Vehicle, parameters: CascadeParameters) ->
     """Specific force in m/s^2 within thrust and tilt limits; the vertical part is served first."""
     most = parameters.thrust_share * 4.0 * vehicle.rotor_gain * vehicle.thrust_max / vehicle.mass
     f_z = clip(f_W.z, parameters.fall_share * vehicle.gravity, most)
-    room = minimum(sqrt(most * most - f_z * f_z), parameters.tilt_tangent * f_z)
+    # Factored: a compiler may fuse most^2 - f_z^2 into one rounding, which can be below zero where the two are equal.
+    room = minimum(sqrt((most - f_z) * (most + f_z)), parameters.tilt_tangent * f_z)
     # The small term keeps the quotient finite at rest; it changes nothing that could be measured.
     horizontal = sqrt(f_W.x * f_W.x + f_W.y * f_W.y + 1e-18)
     scale = minimum(room / horizontal, 1.0)

@@ -39,7 +39,7 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure:
     thresholds = sorted({flight.threshold for flight in drawn if flight.threshold is not None})
     for k, (row, rotor) in enumerate(zip(grid, rotors, strict=True)):
         for axes, window in zip(row, windows, strict=False):
-            loss = Panel(f"loss {rotor}", (solid("loss_estimated", k), dashed("loss_true", k)))
+            loss = Panel(f"loss {rotor}", (solid("loss_estimated", k), dashed("loss_true", k)), reach=np.inf)
             draw_panel(axes, loss, drawn, window)
             for threshold in thresholds:
                 axes.axhline(threshold, zorder=1.6, **THRESHOLD)

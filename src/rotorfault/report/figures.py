@@ -145,7 +145,7 @@ def _rotor_speeds(drawn: Sequence[Drawn]) -> Figure:
 def _control(drawn: Sequence[Drawn], window: tuple[float, float] | None = None) -> Figure:
     figure = new_figure(13.5)
     angles = [r"\mathrm{roll}", r"\mathrm{pitch}", r"\mathrm{yaw}"]
-    V = Panel("V", (solid("lyapunov"),))
+    V = Panel("V", (solid("lyapunov"),), reach=np.inf)
     rows = [
         [Panel("thrust", (solid("thrust_demand"),)), Panel("unallocated", (solid("thrust_unallocated"),)), V],
         [Panel(f"$\\tau_{name}$", (solid("torque_demand", k),)) for k, name in enumerate("xyz")],
@@ -171,12 +171,14 @@ def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
     values = [flight.values("lyapunov") for flight in drawn]
     found = span([value[value > 0.0] for value in values])
     if found is None:
-        axes.text(0.5, 0.5, "V = 0", transform=axes.transAxes, ha="center", va="bottom")
+        if span(values) is not None:
+            axes.text(0.5, 0.6, "V = 0", transform=axes.transAxes, ha="center")
         return
     axes.set_yscale("log", nonpositive="mask")
     axes.set_ylim(max(found[0], found[1] * 10.0**-DECADES) / 2.0, found[1] * 3.0)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    if found[1] > 100.0 * found[0]:
+        axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 FIGURES = {

@@ -36,10 +36,10 @@ from rotorfault.report.style import (
     unit,
 )
 
-LINE, HANDLE = 108, 6  # characters that fit beside each other in a legend; room of a handle and a gap in characters
+ROOM = 0.98  # share of the width that a legend may take
 REACH = 3.0  # spans by which a panel may exceed its core before it is cut
 NEAR_END = 0.98  # share of a lost flight that counts for the scale of a panel
-WIDE, THIN, ALONE = 1.7, 0.9, 1.1  # line widths in points: first and last of several flights, a single one
+WIDE, THIN, ALONE = 1.5, 0.9, 1.1  # line widths in points: first and last of several flights, a single one
 BEFORE, AFTER = 1.0, 2.2  # s around fault onsets that the detail shows
 DETAIL = 0.6  # a detail must be shorter than this share of the flight
 
@@ -182,7 +182,9 @@ def _core(panel: Panel, drawn: Sequence[Drawn], window: tuple[float, float]) -> 
     own, *others = panel.curves
     values = [_inside(flight, own, window)[1] for flight in drawn]
     if panel.follows is None:
-        return [v[: max(int(NEAR_END * len(v)), 1)] if f.fate else v for f, v in zip(drawn, values, strict=True)]
+        # Lost flights set the scale only among themselves, and without what they do near their end.
+        survived = [v for f, v in zip(drawn, values, strict=True) if not f.fate]
+        return survived or [v[: max(int(NEAR_END * len(v)), 1)] for v in values]
     core = [_inside(flight, curve, window)[1] for flight in drawn for curve in others] + [v[:1] for v in values]
     low, high = span(core) or (0.0, 0.0)
     spare = max(panel.follows - (high - low), 0.0) / 2.0
@@ -204,9 +206,11 @@ def _darker(colour: str) -> tuple[float, float, float]:
 def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float) -> None:
     """Limits over all that is drawn, but not farther than `reach` spans beyond the core; say what is cut."""
     everything, middle = span(parts), span(core)
-    if everything is None or middle is None:
+    if everything is None:
         axes.set_ylim(-1.0, 1.0)
+        axes.text(0.5, 0.5, "no finite values", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
+    middle = middle or everything
     allowed = reach * max(middle[1] - middle[0], 1e-3 * max(map(abs, middle)), 1e-9)
     low, high = max(everything[0], middle[0] - allowed), min(everything[1], middle[1] + allowed)
     axes.set_ylim(*padded(low, high))
@@ -321,10 +325,11 @@ def legend(
     others: Iterable[Artist],
     own: str | None = None,
     onset_style: Mapping[str, Any] | None = None,
-) -> None:
+) -> float:
     """A legend above the panels: flights, what else is drawn, fault onset, end of a flight.
 
-    `own` is what the curve of a single flight is called; the flight's label if it is None.
+    `own` is what the curve of a single flight is called; the flight's label if it is None. Returns the height of
+    the legend's lower edge, as a share of the figure's.
     """
     handles: list[Artist] = [sample(f.label, color=f.colour, linestyle=f.line, linewidth=f.width) for f in drawn]
     if own is not None and len(drawn) == 1:
@@ -335,12 +340,11 @@ def legend(
     if lost := [flight for flight in drawn if flight.fate]:
         text = f"{lost[0].fate} at {lost[0].end:.4g} s" if len(drawn) == 1 else "end of flight"
         handles.append(sample(text, **END | {"color": drawn[0].colour if len(drawn) == 1 else GREY}))
-    lengths = [len(str(handle.get_label())) + HANDLE for handle in handles]
-    columns = next((n for n in range(len(handles), 1, -1) if _columns_fit(lengths, n)), 1)
-    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
-
-
-def _columns_fit(lengths: Sequence[int], columns: int) -> bool:
-    # matplotlib fills a legend column by column, the first ones with one entry more.
-    parts = np.array_split(np.asarray(lengths), columns)
-    return sum(int(part.max()) for part in parts) <= LINE
+    for columns in range(len(handles), 0, -1):
+        rows = math.ceil(len(handles) / columns)
+        made = figure.legend(handles=handles, loc="outside upper center", ncols=math.ceil(len(handles) / rows))
+        extent = made.get_window_extent()
+        if columns == 1 or extent.width < ROOM * figure.bbox.width:
+            break
+        made.remove()
+    return 1.0 - 1.5 * float(extent.height / figure.bbox.height)

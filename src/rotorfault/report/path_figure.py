@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import Bbox
 
 from rotorfault.report.panels import END, REFERENCE, Drawn, legend, sample
 from rotorfault.report.style import BLACK, GREY, Array, extremes, new_figure, span
 
 START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
 FAULT: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 4.5, "markeredgecolor": BLACK}
+EDGE = 0.96  # share of the figure that the box with its labels takes
 TARGET: dict[str, Any] = {"linestyle": "", "marker": "*", "markersize": 9.0, "color": BLACK}
 
 
@@ -38,7 +41,7 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
             axes.plot(*seen[-1:].T, **END, color=flight.colour, zorder=7)
     others = _targets(axes, drawn)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.15)
+    axes.set_box_aspect(high - low)
     axes.view_init(elev=24.0, azim=-56.0)
     wide = float((high - low).max())
     for name, one, size in zip("xyz", (axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
@@ -46,9 +49,37 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
         one.set_label_text(f"{name} {drawn[0].unit_of('position')}")
         one.pane.set_facecolor("white")
     axes.tick_params(pad=0.0)
+    # Labels stand off in proportion to the sides of the box: in a flat, long one that of z would be far away.
+    axes.zaxis.labelpad = 17.5 * float((high - low)[2]) / wide - 13.5
     others.insert(0, sample("start", color=GREY, **START))
-    legend(figure, drawn, others, onset_style=FAULT | {"markerfacecolor": GREY})
+    top = legend(figure, drawn, others, onset_style=FAULT | {"markerfacecolor": GREY})
+    _fill(figure, axes, high - low, top)
     return figure
+
+
+def _fill(figure: Figure, axes: Any, aspect: Array, top: float) -> None:
+    """Enlarge and move the box so that it fills the figure below `top` with all its labels inside.
+
+    The layout engine cannot do this: it takes the room of axes in three dimensions for given.
+    """
+    figure.set_layout_engine("none")
+    zoom, middle, size = 1.0, np.array([0.5, top / 2.0]), np.array([1.0, top])
+    for _ in range(3):  # labels do not grow with the box, so one round is not enough
+        axes.set_box_aspect(aspect, zoom=zoom)
+        axes.set_position([*(middle - size / 2.0), *size])
+        figure.draw_without_rendering()
+        seen = Bbox.union([axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)] + [_corners(axes)])
+        low, high = figure.transFigure.inverted().transform(seen.get_points())
+        zoom *= float(min(EDGE / (high - low)[0], EDGE * top / (high - low)[1]))
+        middle += np.array([0.5, top / 2.0]) - 0.5 * (low + high)
+    axes.set_position([*(middle - size / 2.0), *size])
+
+
+def _corners(axes: Any) -> Bbox:
+    corners = np.array([*product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), [1.0])])
+    x, y, _, w = axes.get_proj() @ corners.T
+    seen = axes.transData.transform(np.column_stack([x / w, y / w]))
+    return Bbox([seen.min(axis=0), seen.max(axis=0)])
 
 
 def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
@@ -63,7 +94,8 @@ def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
         least, most = max(least, wanted[:, k].min() - reach * size), min(most, wanted[:, k].max() + reach * size)
         low[k], high[k] = least, most
     # A path in a plane still gets a box with some depth.
-    spare = np.maximum(0.3 * (high - low).max() - (high - low), 0.0) / 2.0 + 0.04 * max((high - low).max(), 0.1)
+    spare = np.maximum(0.3 * (high - low).max() - (high - low), 0.0) / 2.0 + 0.04 * (high - low).max()
+    spare = spare if (high > low).any() else np.full(3, 0.5)
     return low - spare, high + spare
 
 
@@ -75,7 +107,7 @@ def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
         wanted = flight.values("position_reference")
         if np.ptp(wanted, axis=0).max() > 1e-9:
             kept = np.unique(np.concatenate([extremes(wanted[:, k]) for k in range(3)]))
-            axes.plot(*wanted[kept].T, **REFERENCE, zorder=3)
+            axes.plot(*wanted[kept].T, **REFERENCE, zorder=5)
             name, style = "reference", REFERENCE
         else:
             axes.plot(*wanted[-1:].T, **TARGET, zorder=5)

@@ -141,8 +141,10 @@ def unit(name: str) -> str:
 
 
 def number(value: float) -> str:
-    """A number in at most three figures, in mathematical markup where it is large or small."""
-    if value == 0.0 or 1e-2 <= abs(value) < 1e4:
+    """A number in about three figures, in mathematical markup where it is large or small."""
+    if 1e3 <= abs(value) < 1e4:
+        return f"{value:.0f}".replace("-", "−")
+    if value == 0.0 or 1e-2 <= abs(value) < 1e3:
         return f"{value:.3g}".replace("-", "−")
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"${mantissa}\\times 10^{{{int(exponent)}}}$"
