@@ -8,6 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from riccati_problems import (
+    ONE,
+    broadcast,
+    hostile_starts,
+    noise,
+    one,
+    random_arguments,
+    random_problem,
+    relative,
+    rightmost,
+    stack,
+)
 from scipy.linalg import block_diag, solve_continuous_are, solve_continuous_lyapunov
 
 from rotorfault.control.riccati import (
@@ -15,8 +27,6 @@ from rotorfault.control.riccati import (
     Gain,
     _positive_definite,
     attitude_problem,
-    chord_start,
-    chord_step,
     feedback,
     fly,
     guaranteed_gain,
@@ -35,71 +45,6 @@ from rotorfault.control.riccati_reference import (
 )
 from rotorfault.errors import InputError
 from rotorfault.geometry import Mat3, Vec3
-from rotorfault.records import flatten, unflatten
-
-ONE = Vec3(1.0, 1.0, 1.0)
-
-
-# ------------------------------------------------------------------------------------------------ problems at random
-
-
-def random_arguments(rng: np.random.Generator, n: int, rate: float) -> tuple[Mat3, Vec3, Vec3, Vec3, Vec3]:
-    """Drift, b and weights of n random vehicles at body rates up to `rate` rad/s, one element per problem."""
-    J = np.sort(rng.uniform(0.2, 1.0, (3, n)), axis=0)
-    J[2] = np.minimum(J[2], 0.98 * (J[0] + J[1]))  # what moments of inertia of a body have to keep
-    J = rng.permuted(J, axis=0) * 10 ** rng.uniform(-2.5, -1.0, n)
-    p, q, r = rng.uniform(-rate, rate, (3, n)) / 2
-    rotor = rng.uniform(-0.05, 0.05, n) * rate
-    a = (J[1] - J[2]) / J[0], (J[2] - J[0]) / J[1], (J[0] - J[1]) / J[2]
-    zero = np.zeros(n)
-    drift = Mat3(zero, a[0] * r - rotor, a[0] * q, a[1] * r + rotor, zero, a[1] * p, a[2] * q, a[2] * p, zero)
-    b = Vec3(*np.where(rng.random(n) < 0.5, 1.0, 1.0 / J))
-    q_angle, q_rate, r = (Vec3(*10 ** rng.uniform(low, high, (3, n))) for low, high in ((-1, 2), (-2, 1), (-3, 1)))
-    return drift, b, q_angle, q_rate, r.times(b).times(b)
-
-
-def random_problem(rng: np.random.Generator, n: int, rate: float) -> AttitudeProblem:
-    return broadcast(attitude_problem(*random_arguments(rng, n, rate)), n)
-
-
-def broadcast(record: Any, n: int) -> Any:
-    return unflatten(record, [np.broadcast_to(np.asarray(leaf, float), n) for leaf in flatten(record)])
-
-
-def one(record: Any, i: int) -> Any:
-    return unflatten(record, [float(leaf[i]) for leaf in flatten(record)])
-
-
-def noise(rng: np.random.Generator, n: int, low: float, high: float) -> Mat3:
-    size = 10 ** rng.uniform(low, high, n)
-    return Mat3(*(rng.normal(size=n) * size for _ in range(9)))
-
-
-def stack(M: Mat3) -> np.ndarray:
-    return np.stack(np.broadcast_arrays(*M), axis=-1).reshape(-1, 3, 3)
-
-
-def rightmost(problem: AttitudeProblem, gain: Gain) -> np.ndarray:
-    """Largest real part of the closed loop's poles by eigenvalues, NaN where the gain is not finite."""
-    Y, K, W = np.broadcast_arrays(stack(gain.Y), stack(gain.X), stack(problem.W))
-    A = np.zeros((len(Y), 6, 6))
-    A[:, :3, 3:], A[:, 3:, :3], A[:, 3:, 3:] = np.eye(3), -Y, W - K
-    finite = np.isfinite(A).all((1, 2))
-    found = np.full(len(Y), np.nan)
-    found[finite] = np.linalg.eigvals(A[finite]).real.max(1)
-    return found
-
-
-def converged(problem: AttitudeProblem, steps: int = 30) -> Gain:
-    gain = guaranteed_gain(problem)
-    for _ in range(steps):
-        gain, _ = newton_kleinman_step(problem, gain)
-    return gain
-
-
-def relative(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
-
 
 # --------------------------------------------------------------------------------------------------- closed forms
 
@@ -228,26 +173,6 @@ def test_guaranteed_gain_stabilises_for_every_drift(rate: float) -> None:
     assert np.all(routh_stable(problem, gain) == 1.0)
 
 
-def hostile_starts(rng: np.random.Generator, problem: AttitudeProblem, n: int) -> dict[str, Gain]:
-    """Stored gains that belong to other problems, do not stabilise, are singular or are no numbers."""
-    other = random_problem(rng, n, 30.0)
-    solved, wild = converged(other), Gain(noise(rng, n, 0, 3), noise(rng, n, 0, 2))
-    right, near = converged(problem), 10 ** rng.uniform(-4, 0, n)
-    holes = flatten(broadcast(solved, n))
-    for leaf in range(18):
-        holes[leaf] = np.where(rng.random(n) < 0.1, rng.choice([np.nan, np.inf, -np.inf, 0.0, 1e200], n), holes[leaf])
-    return {
-        "another problem's": solved,
-        "another problem's guaranteed": guaranteed_gain(other),
-        "at random": wild,
-        "unstable": Gain(solved.Y, -solved.X),
-        "at the edge": Gain(right.Y + wild.Y * near, right.X + wild.X * near),
-        "holes": unflatten(solved, holes),
-        "zero": broadcast(Gain(solved.Y * 0.0, solved.X * 0.0), n),
-        "NaN": broadcast(Gain(solved.Y * np.nan, solved.X * np.nan), n),
-    }
-
-
 @pytest.mark.parametrize("steps", [1, 2, 3])
 @pytest.mark.parametrize("rate", [2.0, 30.0, 300.0])
 def test_flown_gain_always_stabilises(rate: float, steps: int) -> None:
@@ -352,147 +277,3 @@ def test_false_solutions_have_residual_zero_and_are_not_flown() -> None:
             assert closed_loop_poles(problem, flown).real.max() < 0.0
         caught += int(fly(problem, gain, 1)[2] == 1.0)
     assert caught == 40
-
-
-# ----------------------------------------------------------------------------------------------------- chord step
-
-
-def chord_converged(problem: AttitudeProblem, steps: int) -> Gain:
-    gain = chord_start(problem)
-    for _ in range(steps):
-        gain = chord_step(problem, gain)
-    return gain
-
-
-def test_chord_step_converges_in_its_domain_to_the_same_solution() -> None:
-    rng = np.random.default_rng(17)
-    problem = random_problem(rng, 8000, 10.0)
-    right = converged(problem)
-    z = (right.X - problem.W).diag
-    inside = problem.W.norm() < 0.5 * np.minimum(np.minimum(z.x, z.y), z.z)
-    assert np.sum(inside) > 300
-    with np.errstate(all="ignore"):
-        gain = chord_converged(problem, 60)
-        last, stable = residual(problem, gain), routh_stable(problem, gain)
-    assert np.all(last[inside] < 1e-11)
-    assert np.all(stable[inside] == 1.0)
-    for found, expected in ((gain.Y, right.Y), (gain.X, right.X)):
-        assert np.max(((found - expected).norm() / expected.norm())[inside]) < 1e-9
-
-
-def test_chord_step_is_of_first_order_in_the_drift() -> None:
-    """One warm step contracts the error by about |W|/|Z|: the terms it leaves out are the off-diagonal ones."""
-    rng = np.random.default_rng(19)
-    problem = random_problem(rng, 500, 10.0)
-    for factor in (1e-2, 1e-3):
-        small = problem._replace(W=problem.W * factor)
-        start = chord_start(small)
-        before = residual(small, start)
-        after = residual(small, chord_step(small, start))
-        assert np.median(after / before) < 10.0 * factor
-
-
-def test_chord_step_from_the_guaranteed_gain_is_shown_up_by_the_residual() -> None:
-    """It converges to a gain whose three blocks vanish, but whose X is not symmetric."""
-    problem = attitude_problem(Mat3.skew(Vec3(0.3, -0.2, 0.1)), ONE, Vec3(1.0, 2.0, 3.0), ONE, ONE)
-    gain = guaranteed_gain(problem)
-    for _ in range(60):
-        gain = chord_step(problem, gain)
-    Y, X, W = (matrix(M) for M in (gain.Y, gain.X, problem.W))
-    Z = X - W
-    assert np.abs(Z.T @ Z - matrix(problem.Qd) - W.T @ W - Y - Y.T).max() < 1e-12
-    assert np.abs(Y.T @ Z - Z.T @ Y).max() < 1e-12
-    assert residual(problem, gain) > 1e-2
-
-
-# ------------------------------------------------------------------------------------------------------ in flight
-
-
-def flight(rate: float, steps: int, instants: int) -> tuple[float, float]:
-    """Largest residual and number of guarded instants of a tumbling flight, 1 ms per instant, from a cold start."""
-    a = Vec3(-0.75, 0.7, 0.08)
-    stored, largest, guards = None, 0.0, 0.0
-    for k in range(instants):
-        t = 1e-3 * k
-        p, q, r = (0.5 * rate * math.sin(f * t + c) for f, c in ((11.0, 0.0), (7.0, 1.0), (5.0, 2.0)))
-        drift = Mat3(0.0, a.x * r, a.x * q, a.y * r, 0.0, a.y * p, a.z * q, a.z * p, 0.0)
-        problem = attitude_problem(drift, ONE, ONE, ONE, ONE * 0.0088)
-        stored, last, guarded = fly(problem, stored or guaranteed_gain(problem), steps)
-        largest, guards = max(largest, last if k >= 6 else 0.0), guards + guarded
-    return largest, guards
-
-
-def test_one_warm_step_per_millisecond_tracks_the_solution() -> None:
-    slow, slow_guards = flight(5.0, 1, 400)
-    fast, fast_guards = flight(20.0, 1, 400)
-    assert slow_guards == fast_guards == 0.0
-    assert slow < 1e-4
-    assert fast < 1e-3
-    assert flight(20.0, 2, 200)[0] < 1e-3 * fast
-
-
-def test_flight_recovers_from_a_lost_measurement() -> None:
-    rng = np.random.default_rng(23)
-    problem = one(random_problem(rng, 1, 10.0), 0)
-    gain, _, _ = fly(problem._replace(W=problem.W * math.nan), solve_iterated(problem), 1)
-    assert all(math.isnan(element) for element in flatten(gain.X))
-    gain, last, guarded = fly(problem, gain, 1)
-    assert guarded == 1.0
-    for _ in range(30):
-        gain, last, guarded = fly(problem, gain, 1)
-        assert guarded == 0.0
-    assert last < 1e-12
-
-
-def test_a_flight_without_a_step_is_refused() -> None:
-    problem = attitude_problem(Mat3.skew(ONE), ONE, ONE, ONE, ONE)
-    with pytest.raises(ValueError, match="at least one"):
-        fly(problem, guaranteed_gain(problem), 0)
-
-
-# -------------------------------------------------------------------------------------------------------- engines
-
-
-@pytest.fixture(scope="module")
-def case() -> tuple[np.ndarray, np.ndarray, Any]:
-    """64 problems and stored gains as rows of an array, the outcome of `fly` on arrays, and their shape."""
-    rng = np.random.default_rng(29)
-    problem = random_problem(rng, 64, 30.0)
-    stored = broadcast(Gain(*hostile_starts(rng, problem, 64)["holes"]), 64)
-    shape = (problem, stored)
-    with np.errstate(all="ignore"):
-        out = np.array([np.broadcast_to(leaf, 64) for leaf in flatten(fly(problem, stored, 2))])
-    assert 0 < out[-1].sum() < 64
-    return np.array(flatten(shape)), out, shape
-
-
-def test_floats_agree_with_arrays(case: Any) -> None:
-    rows, expected, shape = case
-    for i in range(64):
-        problem, stored = unflatten(shape, [float(x) for x in rows[:, i]])
-        assert flatten(fly(problem, stored, 2)) == pytest.approx(list(expected[:, i]), rel=1e-12, abs=1e-12)
-
-
-def scale(expected: np.ndarray) -> np.ndarray:
-    """Size of the matrix that each number belongs to: rounding is relative to that, not to a small element."""
-    return np.repeat([np.abs(expected[:9]).max(0), np.abs(expected[9:18]).max(0)], 9, axis=0)
-
-
-def test_heyoka_agrees_with_arrays(case: Any) -> None:
-    hy = pytest.importorskip("heyoka")
-    rows, expected, shape = case
-    variables = [hy.expression(f"v{i}") for i in range(len(rows))]
-    function = hy.cfunc(flatten(fly(*unflatten(shape, variables), 2)), variables)
-    found = function(np.ascontiguousarray(rows))
-    assert np.array_equal(found[-1], expected[-1])
-    assert np.max(np.abs(found[:18] - expected[:18]) / scale(expected)) < 1e-9
-
-
-def test_casadi_agrees_with_arrays(case: Any) -> None:
-    ca = pytest.importorskip("casadi")
-    rows, expected, shape = case
-    variables = [ca.SX.sym(f"v{i}") for i in range(len(rows))]
-    outputs = flatten(fly(*unflatten(shape, variables), 2))
-    found = np.array(ca.Function("fly", [ca.vertcat(*variables)], [ca.vertcat(*outputs)])(rows))
-    assert np.array_equal(found[-1], expected[-1])
-    assert np.max(np.abs(found[:18] - expected[:18]) / scale(expected)) < 1e-9

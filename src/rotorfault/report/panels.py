@@ -163,7 +163,7 @@ def draw_panel(axes: Axes, panel: Panel, drawn: Sequence[Drawn], window: tuple[f
     for flight in drawn:
         _mark_end(axes, flight, panel.curves[0], window)
     axes.set_xlim(*window)
-    axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     mark_onsets(axes, drawn, window)
 

@@ -1,0 +1,69 @@
+"""Vehicles, demands and beliefs that the tests of allocation share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rotorfault.allocation import ALLOCATORS
+from rotorfault.allocation.protocol import settings_class
+from rotorfault.geometry import PerRotor, Vec3
+from rotorfault.records import flatten
+from rotorfault.signals import Allocation, Diagnosis, Wrench, healthy
+from rotorfault.vehicle import Vehicle, wrench_of
+from rotorfault.vehicle_file import load_vehicle, vehicle_names
+
+Array = NDArray[np.float64]
+PAPER = load_vehicle("paper").vehicle
+VEHICLES = {name: load_vehicle(name).vehicle for name in vehicle_names()}
+# Stretched X with a floor below the thrust, a gain and the other sense of rotation: nothing cancels by luck.
+VEHICLES["stretched"] = PAPER._replace(
+    rotor_x=PerRotor(0.2, -0.2, -0.15, 0.15),
+    rotor_y=PerRotor(-0.25, 0.25, -0.22, 0.22),
+    rotor_yaw_sign=PerRotor(-1.0, -1.0, 1.0, 1.0),
+    thrust_min=0.4,
+    rotor_gain=1.2,
+)
+each_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+each_allocator = pytest.mark.parametrize("name", list(ALLOCATORS))
+
+
+def make(name: str) -> Any:
+    allocator = ALLOCATORS[name]
+    return allocator(settings_class(allocator)())
+
+
+def belief(*loss: float) -> Diagnosis:
+    """Losses believed, and flagged where they are not 0."""
+    return healthy()._replace(
+        loss=PerRotor(*loss), flagged=PerRotor(*(0.0 if value == 0.0 else 1.0 for value in loss))
+    )
+
+
+def matrix(vehicle: Vehicle) -> Array:
+    """The effectiveness matrix, column by column."""
+    return np.array([flatten(wrench_of(vehicle, PerRotor(*row))) for row in np.eye(4)]).T
+
+
+def wrench(numbers: Any) -> Wrench:
+    thrust, *torque = (float(number) for number in numbers)
+    return Wrench(thrust, Vec3(*torque))
+
+
+def demand_of(vehicle: Vehicle, shares: Any) -> Wrench:
+    """A demand from rotor thrusts given as shares of the largest one; outside [0, 1] it cannot be met."""
+    return wrench_of(vehicle, PerRotor(*shares) * (vehicle.thrust_max * vehicle.rotor_gain))
+
+
+def commands(allocation: Allocation) -> Array:
+    return np.array(list(allocation.command))
+
+
+wild = st.tuples(*[st.floats(-3.0, 4.0)] * 4)
+inside = st.tuples(*[st.floats(0.1, 0.9)] * 4)
+losses = st.tuples(*[st.one_of(st.just(0.0), st.just(1.0), st.floats(0.0, 1.0))] * 4)
+partial = st.tuples(*[st.floats(0.0, 0.9)] * 4)
