@@ -3,6 +3,8 @@
 PYTHON ?= python3
 PIP := .venv/bin/python -m pip --disable-pip-version-check
 NUMPY_PIP := .venv-numpy/bin/python -m pip --disable-pip-version-check
+# Two test processes on two cores: more threads in BLAS only wait for each other.
+export OPENBLAS_NUM_THREADS := 1
 CASE := results/paper-set-point
 
 .DEFAULT_GOAL := help

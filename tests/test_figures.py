@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from itertools import combinations
 from pathlib import Path
 
@@ -27,7 +28,9 @@ ONSET, THRESHOLD = 1.8, 0.12
 UNIT = re.compile(r"\(.+\)$")
 
 
-def made_up(seed: int = 0, duration: float = 20.0, onset: float = ONSET, drift: float = 0.0, **attributes: object) -> xr.Dataset:
+def made_up(
+    seed: int = 0, duration: float = 20.0, onset: float = ONSET, drift: float = 0.0, **attributes: object
+) -> xr.Dataset:
     """A flight to (2, 2, 2) in which rotors 1 and 3 fail; its signals are smooth with noise on top."""
     time = np.arange(round(duration / 0.01)) * 0.01
     random = np.random.default_rng(seed)
@@ -83,7 +86,9 @@ def drawn(request: pytest.FixtureRequest) -> dict[str, Figure]:
 
 def texts(figure: Figure) -> list[tuple[str, Bbox]]:
     """Labels, titles, notes, offsets, tick labels and the legend as they are laid out."""
-    figure.draw_without_rendering()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a layout that was not found
+        figure.draw_without_rendering()
     found = [(f"legend of {figure}", legend.get_window_extent()) for legend in figure.legends]
     for axes in figure.axes:
         parts: list[Text] = [*axes.texts, axes.title]
@@ -92,10 +97,11 @@ def texts(figure: Figure) -> list[tuple[str, Bbox]]:
             parts += [one_axis.label, one_axis.get_offset_text()]
             if flat:
                 low, high = sorted(one_axis.get_view_interval())
-                slack = 1e-6 * (high - low)
-                inside = [tick for tick in one_axis.get_major_ticks() if low - slack <= tick.get_loc() <= high + slack]
-                parts += [tick.label1 for tick in inside if tick.label1.get_visible()]
-        found += [(part.get_text(), part.get_window_extent()) for part in parts if part.get_visible() and part.get_text()]
+                slack = 0.0 if one_axis.get_scale() == "log" else 1e-6 * (high - low)
+                low, high = low - slack, high + slack
+                parts += [tick.label1 for tick in one_axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        shown = (part for part in parts if part.get_visible() and part.get_text())
+        found += [(part.get_text(), part.get_window_extent()) for part in shown]
     return found
 
 
@@ -116,7 +122,7 @@ def test_every_axis_carries_its_unit(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
         for axes in figure.axes:
             if axes.name == "3d":
-                assert all(re.fullmatch(r"[xyz] \(m\)", a.get_label_text()) for a in (axes.xaxis, axes.yaxis, axes.zaxis))
+                assert [axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()] == ["x (m)", "y (m)", "z (m)"]
                 continue
             place = axes.get_subplotspec()
             assert (axes.get_xlabel() == "time (s)") == place.is_last_row(), name
@@ -131,7 +137,7 @@ def test_nothing_covers_anything_else(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
         found = texts(figure)
         page = figure.bbox.padded(1.0)
-        assert len(found) > 5
+        assert len(found) >= 4
         for text, box in found:
             inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
             assert inside, f"{name}: {text!r} leaves the page: {box}"
@@ -145,7 +151,7 @@ def test_nothing_covers_anything_else(drawn: dict[str, Figure]) -> None:
 def test_the_overlap_check_would_notice(one: dict[str, Figure]) -> None:
     figure = figures.draw(made_up())["position"]
     figure.axes[0].set_title("a title that is much too long for a panel and runs into the one beside it")
-    with pytest.raises(AssertionError, match="overlap|leaves"):
+    with pytest.raises(AssertionError, match=r"overlap|leaves"):
         test_nothing_covers_anything_else({"position": figure})
 
 
@@ -163,8 +169,10 @@ def test_drawn_data_are_finite_and_complete(one: dict[str, Figure]) -> None:
 
 
 def test_reference_is_black_and_dashed(three: dict[str, Figure]) -> None:
-    black = [line for line in three["position"].axes[0].lines if line.get_color() == style.BLACK and line.is_dashed()]
-    assert [len(set(line.get_ydata())) for line in black if line.get_linewidth() == 0.9 and len(line.get_xdata()) > 2] == [1]
+    black = [line for line in three["position"].axes[0].lines if line.get_color() == style.BLACK]
+    (reference,) = [line for line in black if line.get_linestyle() != ":"]
+    assert reference.is_dashed()
+    assert set(reference.get_ydata()) == {2.0}
     assert "reference" in legend_labels(three["position"])
 
 
@@ -173,7 +181,8 @@ def test_fault_onsets_are_marked_and_named_once(one: dict[str, Figure]) -> None:
         for axes in one[name].axes:
             at = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
             assert at == [pytest.approx(ONSET)], name
-        assert [label for label in legend_labels(one[name]) if "onset" in label] == ["fault onset (rotors 1, 3 at 1.8 s)"]
+        labels = [label for label in legend_labels(one[name]) if "onset" in label]
+        assert labels == ["fault onset (rotors 1, 3 at 1.8 s)"]
 
 
 def test_no_fault_no_mark() -> None:
@@ -208,7 +217,7 @@ def test_long_and_odd_labels_are_shown() -> None:
 
 
 def test_a_crash_ends_the_curve_and_does_not_set_the_scale(lost: dict[str, Figure]) -> None:
-    assert np.nanmax(np.abs(crashed()["torque_demand"].values)) > 1e9
+    assert np.nanmax(np.abs(crashed()["torque_demand"].values)) > 1e8
     for name in NAMES & set(lost) - {"path"}:
         for axes in lost[name].axes:
             for line in axes.lines:
@@ -219,6 +228,15 @@ def test_a_crash_ends_the_curve_and_does_not_set_the_scale(lost: dict[str, Figur
                 assert max(map(abs, axes.get_ylim())) < 1e4, name
     assert "diverged at 5.99 s" in legend_labels(lost["position"])
     assert any("up to" in text.get_text() for axes in lost["position"].axes for text in axes.texts)
+
+
+def test_ends_are_marked_inside_their_panels(lost: dict[str, Figure]) -> None:
+    for name in set(lost) - {"path"}:
+        for axes in lost[name].axes:
+            ends = [line for line in axes.lines if line.get_marker() == "x"]
+            low, high = axes.get_ylim()
+            assert ends or axes.get_xlim()[1] < 5.9, name
+            assert all(low <= end.get_ydata()[0] <= high for end in ends), name
 
 
 def test_a_flight_lost_beside_others_leaves_their_scale_alone(three: dict[str, Figure]) -> None:
@@ -313,15 +331,17 @@ def test_thinning_loses_no_extreme_and_no_gap(samples: int, buckets: int, seed: 
             assert finite[int(left) : int(right) + 1].all()
 
 
-def test_saving_writes_all_formats_the_same_each_time(tmp_path: Path, one: dict[str, Figure]) -> None:
-    chosen = {name: one[name] for name in ("position", "path")}
-    paths = figures.save(chosen, tmp_path / "new", ("png", "svg"))
-    assert [path.name for path in paths] == ["position.png", "position.svg", "path.png", "path.svg"]
-    assert paths[0].read_bytes()[:4] == b"\x89PNG"
-    before = [path.read_bytes() for path in paths]
-    figures.save(chosen, tmp_path / "new", ("png", "svg"))
-    assert [path.read_bytes() for path in paths] == before
-    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == sorted(path.name for path in paths)
+def test_the_same_flight_gives_the_same_files(tmp_path: Path) -> None:
+    found = []
+    for name in ("first", "second"):
+        drawn = figures.draw(made_up(duration=3.0))
+        chosen = {key: drawn[key] for key in ("position", "path")}
+        paths = figures.save(chosen, tmp_path / name / "new", ("png", "svg"))
+        assert [path.name for path in paths] == ["position.png", "position.svg", "path.png", "path.svg"]
+        assert sorted((tmp_path / name / "new").iterdir()) == sorted(paths)
+        found.append([path.read_bytes() for path in paths])
+    assert found[0][0][:4] == b"\x89PNG"
+    assert found[0] == found[1]
 
 
 def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

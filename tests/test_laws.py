@@ -16,6 +16,7 @@ from scipy.signal import cont2discrete
 from rotorfault.assembly import assemble, assemble_all
 from rotorfault.config import validate
 from rotorfault.control import CONTROLLERS
+from rotorfault.allocation.attainable import thrust_available
 from rotorfault.control.cascade import (
     AttitudeReference,
     Cascade,
@@ -78,7 +79,7 @@ def controller_step(made: Cascade, vehicle: Vehicle, seen: Measurement, wanted: 
     if "reference" in inputs:
         memory = memory._replace(reference=inputs["reference"])
     residual = inputs.get("residual", 0.0)
-    after, output = made.step(memory, ControlInputs(seen, wanted, vehicle, NOTHING, residual), numbers, 1e-3)
+    after, output = made.step(memory, ControlInputs(seen, wanted, vehicle, NOTHING, residual, thrust_available(vehicle, PerRotor.all(0.0))), numbers, 1e-3)
     return memory, after, output
 
 
@@ -282,7 +283,7 @@ def test_attitude_for_inverts_the_thrust_axis(attitude: Vec3, size: float, yaw_r
 def test_force_limits(f: Vec3, tilt: float, share: float) -> None:
     numbers = cascade(tilt_max=tilt, thrust_share=share, fall_share=0.3).parameters(VEHICLE, 1e-3)
     most, least = share * 4.0 * VEHICLE.thrust_max / VEHICLE.mass, 0.3 * VEHICLE.gravity
-    given_, wanted = arr(limited_force(f, VEHICLE, numbers)), arr(f)
+    given_, wanted = arr(limited_force(f, thrust_available(VEHICLE, PerRotor.all(0.0)), VEHICLE, numbers)), arr(f)
     # The vertical part comes first: whatever is asked for sideways, it is cut by its own limits only.
     assert given_[2] == min(max(wanted[2], least), most)
     assert math.hypot(*given_) <= most * (1.0 + 1e-12)

@@ -82,7 +82,8 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
         state=_stacked(first.state, [batch.state for batch in batches]),
         parameters=_stacked(first.parameters, [batch.parameters for batch in batches]),
         flights=len(batches),
-        seeds=tuple((scenario.seed, i) for i, scenario in enumerate(scenarios)),
+        # Each by its own seed, whatever its place: a flight is the same alone and in any batch.
+        seeds=tuple(seed for batch in batches for seed in batch.seeds),
     )
 
 

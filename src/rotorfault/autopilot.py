@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple, final
 
+from rotorfault.allocation.attainable import thrust_available
 from rotorfault.allocation.protocol import Allocator
 from rotorfault.control.protocol import ControlInputs, Controller, ControlTelemetry, Prediction
 from rotorfault.diagnosis.protocol import Diagnoser, DiagnosisInputs
@@ -119,7 +120,9 @@ class Autopilot:
         prediction = predict(memory, measurement, diagnosis, vehicle, speed)
         control_memory, demanded = self.controller.step(
             memory.control,
-            ControlInputs(measurement, reference, vehicle, prediction, speed),
+            ControlInputs(
+                measurement, reference, vehicle, prediction, speed, thrust_available(vehicle, diagnosis.loss)
+            ),
             parameters.control,
             dt,
         )

@@ -28,6 +28,8 @@ Scalar: TypeAlias = Any
 
 NAN = math.nan
 
+_LARGEST_ANGLE = 1e14  # rad: beyond it doubles are a hundredth of a radian apart
+
 
 class _Floats:
     """Python floats. ``math`` raises where IEEE arithmetic gives NaN or infinity; here it must not."""
@@ -97,8 +99,8 @@ class _Heyoka:
     def __init__(self, module: ModuleType) -> None:
         self._expression = module.expression
         self._lt, self._lte, self._select = module.lt, module.lte, module.select
-        self._atan2 = module.atan2
-        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "cos", "tan", "asin", "tanh")}
+        self._atan2, self._cos, self._tan = module.atan2, module.cos, module.tan
+        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "asin", "tanh")}
         self._sqrt = module.sqrt
 
     def __getattr__(self, name: str) -> Any:
@@ -107,6 +109,18 @@ class _Heyoka:
 
     def sqrt(self, x: Scalar) -> Scalar:
         return self._sqrt(x)
+
+    def cos(self, x: Scalar) -> Scalar:
+        return self._lane_by_lane(self._cos, x)
+
+    def tan(self, x: Scalar) -> Scalar:
+        return self._lane_by_lane(self._tan, x)
+
+    def _lane_by_lane(self, function: Any, x: Scalar) -> Scalar:
+        # Where one lane is NaN or beyond 1e14, the vectorised cosine takes another way for all lanes, which rounds
+        # differently: a flight that is lost would change the last bits of its neighbours.
+        plain = self._lte(self._lift(-_LARGEST_ANGLE), x) * self._lte(x, self._lift(_LARGEST_ANGLE))
+        return self._select(plain, function(self._select(plain, x, self._lift(0.0))), self._lift(NAN))
 
     def _lift(self, x: Scalar) -> Scalar:
         return x if isinstance(x, self._expression) else self._expression(float(x))

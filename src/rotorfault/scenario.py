@@ -52,8 +52,11 @@ class Part:
         return {"kind": self.kind, **self.settings.model_dump(mode="json", exclude_none=True)}
 
 
-def _part(registry: Registry[Any]) -> Any:
-    """Type of a field that takes a part of a registry, as a table with ``kind`` or as a bare name."""
+def _part(registry: Registry[Any], default: str | None = None) -> Any:
+    """Type of a field that takes a part of a registry, as a table with ``kind`` or as a bare name.
+
+    A table without ``kind`` is one of the default kind, where there is one.
+    """
 
     def read(value: Any) -> Part:
         if isinstance(value, Part):
@@ -61,6 +64,8 @@ def _part(registry: Registry[Any]) -> Any:
         table = {"kind": value} if isinstance(value, str) else value
         if not isinstance(table, dict):
             raise refusal("", f"got {value!r}; allowed: a table with 'kind', or a name: {', '.join(registry)}")
+        if "kind" not in table and default is not None:
+            table = {"kind": default, **table}
         if "kind" not in table:
             raise refusal("kind", f"is missing; allowed: {', '.join(registry)}")
         kind = table["kind"]
@@ -146,16 +151,16 @@ class Scenario(Strict):
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
     reference: _part(REFERENCES) = Field(description="where the vehicle shall be")  # type: ignore[valid-type]
-    wind: _part(WINDS) = Field(default="none", validate_default=True, description="wind")  # type: ignore[valid-type]
+    wind: _part(WINDS, "none") = Field(default="none", validate_default=True, description="wind")  # type: ignore[valid-type]
     fault: tuple[_part(FAULTS), ...] = Field(default=(), description="[[fault]] tables")  # type: ignore[valid-type]
-    sensors: _part(SENSORS) = Field(default="ideal", validate_default=True, description="sensors")  # type: ignore[valid-type]
-    controller: _part(CONTROLLERS) = Field(  # type: ignore[valid-type]
+    sensors: _part(SENSORS, "ideal") = Field(default="ideal", validate_default=True, description="sensors")  # type: ignore[valid-type]
+    controller: _part(CONTROLLERS, "roismc") = Field(  # type: ignore[valid-type]
         default="roismc", validate_default=True, description="controller: kind, preset, law, cascade"
     )
-    diagnosis: _part(DIAGNOSES) = Field(  # type: ignore[valid-type]
+    diagnosis: _part(DIAGNOSES, "luenberger") = Field(  # type: ignore[valid-type]
         default="luenberger", validate_default=True, description="source of diagnosis"
     )
-    allocation: _part(ALLOCATORS) = Field(  # type: ignore[valid-type]
+    allocation: _part(ALLOCATORS, "effectiveness") = Field(  # type: ignore[valid-type]
         default="effectiveness", validate_default=True, description="control allocation"
     )
 

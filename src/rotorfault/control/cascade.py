@@ -48,7 +48,7 @@ class CascadeSettings(Strict):
 
     tilt_max: float = Field(default=0.9, gt=0.0, lt=1.5, description="largest demanded tilt [rad]")
     thrust_share: float = Field(
-        default=0.95, gt=0.0, le=1.0, description="share of the largest total thrust that position control may ask for"
+        default=0.95, gt=0.0, le=1.0, description="share of the thrust that the believed rotors have in balance, for position control"
     )
     fall_share: float = Field(
         default=0.3, gt=0.0, lt=1.0, description="least vertical specific force demanded, as a share of gravity"
@@ -92,9 +92,9 @@ class CascadeMemory(NamedTuple):
     reference: AttitudeReference
 
 
-def limited_force(f_W: Vec3, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
-    """Specific force in m/s^2 within thrust and tilt limits; the vertical part is served first."""
-    most = parameters.thrust_share * 4.0 * vehicle.rotor_gain * vehicle.thrust_max / vehicle.mass
+def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
+    """Specific force in m/s^2 within available thrust [N] and tilt; the vertical part is served first."""
+    most = parameters.thrust_share * available / vehicle.mass
     f_z = clip(f_W.z, parameters.fall_share * vehicle.gravity, most)
     # Factored: a compiler may fuse most^2 - f_z^2 into one rounding, which can be below zero where the two are equal.
     room = minimum(sqrt((most - f_z) * (most + f_z)), parameters.tilt_tangent * f_z)
@@ -176,7 +176,7 @@ class Cascade:
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
         wanted = reference.a_W + outer.u + drag_W + gravity_W
-        force_W = limited_force(wanted, vehicle, parameters)
+        force_W = limited_force(wanted, inputs.thrust_available, vehicle, parameters)
 
         # Attitude demand and its filter.
         if six_inputs:

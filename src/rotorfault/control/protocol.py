@@ -30,6 +30,7 @@ class ControlInputs(NamedTuple):
     vehicle: Vehicle  # the autopilot's belief, not the truth
     prediction: Prediction
     residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
+    thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
 
 
 class ControlTelemetry(NamedTuple):

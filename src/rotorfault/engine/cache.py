@@ -5,7 +5,8 @@ processor, and the structure of the loop (classes and settings of its parts). A 
 the source of its own module; where that cannot be read, the loop is kept in the process only.
 
 On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
-off). A file that cannot be read is compiled anew and replaced.
+off). A file begins with the SHA-256 of the rest, for heyoka loads damaged code without complaint; one that is
+damaged or cannot be read is compiled anew and replaced.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from rotorfault.engine.structure import parts_of, structure
 from rotorfault.files import write_atomically
 
 _KEPT: dict[str, Any] = {}
+_SUM_LENGTH = hashlib.sha256().digest_size
 
 
 class Key(NamedTuple):
@@ -73,9 +75,11 @@ def _load(path: Path | None) -> Any:
     if path is None:
         return None
     try:
-        return pickle.loads(path.read_bytes())
+        content = path.read_bytes()
+        sum_, made = content[:_SUM_LENGTH], content[_SUM_LENGTH:]
+        return pickle.loads(made) if hashlib.sha256(made).digest() == sum_ else None
     except Exception:
-        # Missing, truncated, or of another heyoka: whatever it is, the loop can be compiled anew.
+        # Missing, or of another heyoka: whatever it is, the loop can be compiled anew.
         return None
 
 
@@ -84,7 +88,9 @@ def _store(path: Path | None, made: Any) -> None:
         return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, lambda temporary: temporary.write_bytes(pickle.dumps(made)))
+        content = pickle.dumps(made)
+        content = hashlib.sha256(content).digest() + content
+        write_atomically(path, lambda temporary: temporary.write_bytes(content))
     except OSError:
         return  # a cache that cannot be written costs a second next time, nothing else
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from rotorfault.report.panels import (
     REFERENCE,
@@ -16,6 +17,7 @@ from rotorfault.report.panels import (
     Panel,
     dashed,
     draw_panel,
+    keep_ends_inside,
     legend,
     one_scale,
     sample,
@@ -49,14 +51,17 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure:
         row[-1].set_ylabel(f"rotor {rotor} {drawn[0].unit_of('thrust_residual')}")
     losses = [flight.values(name) for flight in drawn for name in ("loss_estimated", "loss_true")]
     top = max((span(losses) or (0.0, 0.0))[1] * 1.15, max(thresholds, default=0.0) * 1.5, 0.05)
+    top = min(top, 1.1)  # a loss is at most 1, whatever a diverging flight says
     for axes in grid[:, :-1].flat:
         axes.set_ylim(-0.04 * top, top)
+        keep_ends_inside(axes)
     one_scale(grid[:, -1])
     titles = ["loss", "loss around the fault onset"][: len(windows)]
     for axes, title in zip(grid[0], [*titles, "thrust residual"], strict=True):
         axes.set_title(title)
     for axes in grid[-1]:
         axes.set_xlabel("time (s)")
+        axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     for axes in grid[:, 1 : len(windows)].flat:
         axes.tick_params(labelleft=False)
     figure.align_ylabels(grid[:, 0])

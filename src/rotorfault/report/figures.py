@@ -29,6 +29,7 @@ from rotorfault.report.panels import (
     detail,
     draw_panel,
     flights,
+    keep_ends_inside,
     legend,
     sample,
     solid,
@@ -175,7 +176,10 @@ def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
             axes.text(0.5, 0.6, "V = 0", transform=axes.transAxes, ha="center")
         return
     axes.set_yscale("log", nonpositive="mask")
-    axes.set_ylim(max(found[0], found[1] * 10.0**-DECADES) / 2.0, found[1] * 3.0)
+    # A flight that is lost may reach up as far as it likes, but not push the others out of sight.
+    calm = span([v[v > 0.0] for f, v in zip(drawn, values, strict=True) if not f.fate]) or found
+    axes.set_ylim(max(calm[0], calm[1] * 10.0**-DECADES) / 2.0, found[1] * 3.0)
+    keep_ends_inside(axes)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     if found[1] > 100.0 * found[0]:
         axes.yaxis.set_minor_formatter(NullFormatter())

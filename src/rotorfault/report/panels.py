@@ -228,8 +228,16 @@ def _mark_end(axes: Axes, flight: Drawn, curve: Curve, window: tuple[float, floa
     if not flight.fate or not finite.size or not window[0] <= flight.end <= window[1]:
         return
     low, high = axes.get_ylim()
-    value = float(np.clip(values[finite[-1]], low, high))
-    axes.plot(flight.time[finite[-1]], value, **END | {"color": flight.colour})
+    axes.plot(flight.time[finite[-1]], values[finite[-1]], **END | {"color": flight.colour})
+    axes.set_ylim(low, high)
+    keep_ends_inside(axes)
+
+
+def keep_ends_inside(axes: Axes) -> None:
+    """Move marks of ends to the edge of the panel where they lie outside; to be called after its limits changed."""
+    for line in axes.lines:
+        if line.get_marker() == END["marker"]:
+            line.set_ydata(np.clip(np.asarray(line.get_ydata(), dtype=float), *axes.get_ylim()))
 
 
 REFERENCE: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4.0, 2.2)), "linewidth": 0.9}
@@ -310,8 +318,14 @@ def one_scale(panels: Iterable[Axes]) -> None:
     """Give panels the limits that hold all of them."""
     panels = list(panels)
     limits = [axes.get_ylim() for axes in panels]
-    for axes in panels:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+    low, high = min(low for low, _ in limits), max(high for _, high in limits)
+    for axes, (lower, upper) in zip(panels, limits, strict=True):
+        axes.set_ylim(low, high)
+        # Ends that were moved to the edge belong at the new one.
+        for line in axes.lines:
+            if line.get_marker() == END["marker"]:
+                y = np.asarray(line.get_ydata(), dtype=float)
+                line.set_ydata(np.where(y >= upper, high, np.where(y <= lower, low, y)))
 
 
 def sample(label: str, **style: Any) -> Line2D:

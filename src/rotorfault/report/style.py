@@ -76,7 +76,8 @@ def envelope(time: Array, values: Array, buckets: int = BUCKETS) -> tuple[Array,
     time, values : ndarray, shape (samples,)
         Values may hold NaN; infinity counts as NaN.
     buckets : int
-        The result has at most ``2 buckets + 2`` samples, all of them samples of the curve, in order of time.
+        The result has at most two samples per bucket, the ends and the edges of gaps, all of them samples of the
+        curve and in order of time.
     """
     values = np.where(np.isfinite(values), values, np.nan)
     if len(time) <= 2 * buckets:

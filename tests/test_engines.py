@@ -1,0 +1,379 @@
+"""The engines: the same numbers on all, alone and in any batch; the cache of compiled loops; records and endings."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rotorfault
+from rotorfault.assembly import assemble, assemble_all
+from rotorfault.control.cascade import Cascade, CascadeSettings, limited_force
+from rotorfault.control.sdre import Sdre, Weights
+from rotorfault.engine import ENGINES, cache, default_engine, have_simd, load_engine
+from rotorfault.engine.batch import CHUNK, Batch, Noise, Recording, no_watch
+from rotorfault.engine.structure import structure
+from rotorfault.errors import InputError
+from rotorfault.geometry import Vec3
+from rotorfault.neighbours import neighbour
+from rotorfault.scenario import Scenario, load_scenario, scenario_from
+from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.vehicle_file import load_vehicle
+
+Array = NDArray[np.float64]
+POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)
+SPREAD = 5e-9  # relative, over all signals: rates and switching inputs are large and steep
+_NEEDS = {"simd": [pytest.mark.skipif(not have_simd(), reason="needs heyoka")]}
+every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
+
+
+def case_one(**changes: Any) -> Scenario:
+    return load_scenario("paper-set-point", {"controller.kind": "roismc"} | changes)
+
+
+def short(**tables: Any) -> Scenario:
+    """A cheap flight with sensor noise and a fault."""
+    return scenario_from(
+        {
+            "name": "short",
+            "vehicle": "paper",
+            "duration": 0.3,
+            "period": 0.005,
+            "step": 0.005,
+            "reference": {"kind": "set_point", "position": [0.2, -0.1, 0.3]},
+            "controller": {"kind": "smc", "preset": "none"},
+            "fault": [{"kind": "step", "rotor": 2, "time": 0.1, "loss": 0.2}],
+            "sensors": "noisy",
+            "wind": "constant",
+        }
+        | tables,
+        "test",
+    )
+
+
+def run(batch: Batch | Scenario, engine: str, watch: Any = no_watch) -> Recording:
+    return load_engine(engine)(assemble(batch) if isinstance(batch, Scenario) else batch, watch)
+
+
+def assert_same(found: Array, wanted: Array) -> None:
+    """1e-9 m in position, and every other signal to a like share of its size."""
+    assert np.abs(found[:, POSITION] - wanted[:, POSITION]).max() <= 1e-9
+    size = np.maximum(1.0, np.abs(wanted).max(axis=0, keepdims=True))
+    worst = np.abs(found - wanted) / size
+    assert worst.max() <= SPREAD, SIGNAL_NAMES[int(np.argmax(worst.max(axis=(0, 2))))]
+
+
+# ------------------------------------------------------------------------------------------------ the same on all
+
+
+@pytest.fixture(scope="module")
+def simd_case_one() -> Array:
+    pytest.importorskip("heyoka")
+    return run(case_one(duration=4.0), "simd").signals
+
+
+def test_python_agrees_with_simd(simd_case_one: Array) -> None:
+    """4 s of case 1 with both faults at 1.8 s."""
+    found = run(case_one(duration=4.0), "python").signals
+    assert found[-1, SIGNAL_NAMES.index("fault_flag.r1"), 0] == 1.0
+    assert found[-1, SIGNAL_NAMES.index("fault_flag.r3"), 0] == 1.0
+    assert_same(found, simd_case_one)
+
+
+def test_numpy_agrees_with_simd() -> None:
+    """The first 3 s of case 1, and of a neighbour whose faults come at 1 s, at 2 ms."""
+    pytest.importorskip("heyoka")
+    base = case_one(duration=3.0, period=0.002, step=0.002)
+    batch = assemble_all([base, neighbour(base, 3, onset=(1.0, 1.0))])
+    found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
+    assert found.shape == (1500, len(SIGNAL_NAMES), 2)
+    assert (found[-1, SIGNAL_NAMES.index("fault_flag.r1")] == 1.0).all()
+    assert_same(found, wanted)
+
+
+def test_force_limit_stays_real_on_compiled_code() -> None:
+    """Fused operations round a^2 - b^2 once: where a = b it fell below zero under the root, and the flight was lost."""
+    hy = pytest.importorskip("heyoka")
+    vehicle = load_vehicle("paper").vehicle
+    x, y, z, share = hy.make_vars("x", "y", "z", "share")
+    cascade = Cascade(Sdre(Weights()), CascadeSettings())
+    numbers = cascade.parameters(vehicle, 1e-3)._replace(thrust_share=share)
+    force = limited_force(Vec3(x, y, z), 4.0 * vehicle.thrust_max, vehicle, numbers)
+    shares = np.linspace(0.5, 1.0, 4096)
+    compiled = hy.cfunc(list(force), [x, y, z, share])
+    found = compiled(np.ascontiguousarray([np.full(4096, 9.0), np.full(4096, -4.0), np.full(4096, 1e3), shares]))
+    assert np.isfinite(found).all()
+    assert np.abs(found[:2]).max() < 1e-6
+    np.testing.assert_allclose(found[2], shares * 4.0 * vehicle.thrust_max / vehicle.mass, rtol=1e-14)
+
+
+# ----------------------------------------------------------------------------------------- alone and in any batch
+
+
+@every_engine
+@pytest.mark.parametrize("sensors", ["ideal", "noisy"])
+def test_a_flight_does_not_depend_on_its_batch(engine: str, sensors: str) -> None:
+    """Exactly, not about: whatever its neighbours, its place and the size of the batch."""
+    base = short(sensors=sensors, seed=7)
+    others = [neighbour(base, k).model_copy(update={"seed": 100 + k}) for k in range(8)]
+    alone = run(base, engine).signals[:, :, 0]
+    assert np.isfinite(alone).all()
+    places: list[tuple[int, int, int]] = [(3, 0, 0), (3, 2, 4), (9, 0, 0), (9, 8, 0), (9, 5, 3)]
+    for size, place, shift in places if engine == "simd" else places[1:2]:
+        batch = [others[(k + shift) % 8] for k in range(size - 1)]
+        batch.insert(place, base)
+        together = run(assemble_all(batch), engine).signals
+        assert together.shape[2] == size
+        np.testing.assert_array_equal(together[:, :, place], alone)
+        if size > 1:
+            assert np.abs(together[:, :, (place + 1) % size] - alone).max() > 1e-3
+
+
+def test_a_long_compiled_flight_does_not_depend_on_its_batch(simd_case_one: Array) -> None:
+    base = case_one(duration=4.0)
+    for size in (3, 9):
+        batch = assemble_all([base, *(neighbour(base, k) for k in range(1, size))])
+        np.testing.assert_array_equal(run(batch, "simd").signals[:, :, 0], simd_case_one[:, :, 0])
+
+
+def test_noise_belongs_to_the_flight() -> None:
+    seeds = ((7, 0), (7, 4711), (8, 0))
+    together = Noise(seeds).draw(40)
+    assert together.shape == (40, 12, 3)
+    for i, seed in enumerate(seeds):
+        alone = Noise((seed,))
+        pieces = np.concatenate([alone.draw(1), alone.draw(29), alone.draw(10)])  # in whatever pieces it is drawn
+        np.testing.assert_array_equal(pieces[:, :, 0], together[:, :, i])
+    assert np.abs(np.corrcoef(together.reshape(480, 3).T) - np.eye(3)).max() < 0.2
+    assert abs(together.mean()) < 0.1
+    assert abs(together.std() - 1.0) < 0.1
+
+
+@every_engine
+def test_the_seed_is_all_that_names_the_noise(engine: str) -> None:
+    base = short(duration=0.05)
+    first, again, other = (run(short(duration=0.05, seed=s), engine).signals for s in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 1e-3
+    assert np.isfinite(run(base, engine).signals).all()
+
+
+def test_noise_crosses_chunks_the_same_on_all_engines() -> None:
+    """More steps than are drawn at a time."""
+    pytest.importorskip("heyoka")
+    long = short(duration=0.005 * (CHUNK + 40))
+    assert_same(run(long, "python").signals, run(long, "simd").signals)
+
+
+def test_a_batch_of_unlike_flights_is_refused() -> None:
+    with pytest.raises(InputError, match="at least one"):
+        assemble_all([])
+    for change in (
+        {"sensors": "ideal"},
+        {"duration": 0.35},
+        {"reference": {"kind": "set_point", "position": [0.0, 0.0, 0.0]}},
+        {"allocation": "nominal"},
+        {"record_period": 0.01},
+        {"step": 0.0025},
+        {"controller": "sdre"},
+    ):
+        with pytest.raises(InputError, match="scenario 'other' differs from the first in more than numbers"):
+            assemble_all([short(), short(name="other", **change)])
+
+
+# ------------------------------------------------------------------------------------------------ records and endings
+
+
+@every_engine
+def test_only_every_tenth_step_is_recorded(engine: str) -> None:
+    full, thin = run(short(), engine), run(short(record_period=0.05), engine)
+    assert full.steps.tolist() == list(range(60))
+    assert thin.steps.tolist() == [0, 10, 20, 30, 40, 50]
+    np.testing.assert_array_equal(thin.signals, full.signals[::10])
+
+
+@every_engine
+def test_records_cross_chunks(engine: str) -> None:
+    """7 divides no chunk: the count of steps goes on, it does not begin anew."""
+    thin = run(short(duration=0.005 * (CHUNK + 60), record_period=0.035), engine)
+    assert thin.steps.tolist() == list(range(0, CHUNK + 60, 7))
+
+
+@every_engine
+def test_a_watch_ends_a_batch(engine: str) -> None:
+    seen: list[tuple[int, int]] = []
+
+    def watch(done: int, records: Array) -> bool:
+        seen.append((done, len(records)))
+        return done >= CHUNK
+
+    recording = run(short(duration=0.005 * 3 * CHUNK, record_period=0.01), engine, watch)
+    assert seen == [(CHUNK, CHUNK // 2)]
+    assert len(recording.steps) == len(recording.signals) == CHUNK // 2
+    assert not recording.interrupted
+
+
+@every_engine
+def test_an_interrupted_flight_keeps_what_it_has(engine: str) -> None:
+    def watch(done: int, records: Array) -> bool:
+        raise KeyboardInterrupt
+
+    recording = run(short(duration=0.005 * 2 * CHUNK), engine, watch)
+    assert recording.interrupted
+    assert len(recording.steps) == len(recording.signals) == CHUNK
+
+
+@every_engine
+def test_a_lost_flight_is_data(engine: str) -> None:
+    """A vehicle without mass has no numbers; its neighbours fly on, unchanged to the last bit."""
+    good = short(sensors="ideal")
+    batch = assemble_all([good, good])
+    # Mass is a row of the parameters like any other.
+    vehicle = batch.parameters.plant.vehicle
+    dead = batch.parameters.plant._replace(vehicle=vehicle._replace(mass=np.array([0.0, vehicle.mass[1]])))
+    signals = run(batch._replace(parameters=batch.parameters._replace(plant=dead)), engine).signals
+    assert not np.isfinite(signals[-1, POSITION, 0]).any()
+    np.testing.assert_array_equal(signals[:, :, 1], run(good, engine).signals[:, :, 0])
+
+
+def test_engines_are_found_by_name() -> None:
+    with pytest.raises(InputError, match=r"unknown engine 'nunpy'; did you mean 'numpy'\?"):
+        load_engine("nunpy")
+    assert default_engine(1) == ("simd" if have_simd() else "python")
+    assert default_engine(1000) == ("simd" if have_simd() else "numpy")
+
+
+def test_without_heyoka_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert (default_engine(1), default_engine(16)) == ("python", "numpy")
+    with pytest.raises(InputError, match="heyoka, which is not installed; use --engine numpy or --engine python"):
+        load_engine("simd")
+
+
+# ------------------------------------------------------------------------------------------------------------ cache
+
+
+class Compiler:
+    """Counts compilations; the compiled thing itself is small, whatever the loop."""
+
+    def __init__(self, simd: Any) -> None:
+        self.count, self._simd, self._right = 0, simd, simd._compile
+
+    def __call__(self, batch: Batch) -> Any:
+        self.count += 1
+        return self._right(batch)
+
+
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Compiler:
+    pytest.importorskip("heyoka")
+    from rotorfault.engine import simd
+
+    found = Compiler(simd)
+    monkeypatch.setattr(simd, "_compile", found)
+    monkeypatch.setattr(cache, "_KEPT", {})
+    monkeypatch.setenv("ROTORFAULT_CACHE", str(tmp_path / "cache"))
+    return found
+
+
+def forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a process that has just been started."""
+    monkeypatch.setattr(cache, "_KEPT", {})
+
+
+def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wanted = run(short(), "simd").signals
+    run(short(seed=3, controller={"kind": "smc", "preset": "none", "cascade": {"tilt_max": 0.5}}), "simd")
+    assert compiler.count == 1, "numbers are no structure"
+    forget(monkeypatch)
+    np.testing.assert_array_equal(run(short(), "simd").signals, wanted)
+    assert compiler.count == 1
+    files = sorted((tmp_path / "cache").iterdir())
+    assert [file.suffix for file in files] == [".loop"]
+
+    # Really another process: its compiler must not be asked.
+    code = (
+        "from rotorfault.engine import simd, load_engine\n"
+        "from rotorfault.assembly import assemble\n"
+        "from rotorfault.engine.batch import no_watch\n"
+        "from rotorfault.scenario import scenario_from\n"
+        "def refuse(batch): raise SystemExit('compiled again')\n"
+        "simd._compile = refuse\n"
+        f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
+        "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
+    )
+    root = str(Path(rotorfault.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": root}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert float.fromhex(done.stdout) == wanted[-1, 0, 0]
+
+
+def test_a_damaged_file_is_replaced(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wanted = run(short(), "simd").signals
+    (file,) = (tmp_path / "cache").iterdir()
+    right = file.read_bytes()
+    middle = len(right) // 2
+    damaged = {
+        "empty": b"",
+        "truncated": right[:middle],
+        "no pickle": b"not at all",
+        "a pickle of something else": hashlib.sha256(b"N.").digest() + b"N.",
+        # heyoka would load this one, and fly with damaged code.
+        "one byte changed": right[:middle] + bytes([right[middle] ^ 1]) + right[middle + 1 :],
+    }
+    for count, (what, content) in enumerate(damaged.items(), start=2):
+        file.write_bytes(content)
+        forget(monkeypatch)
+        np.testing.assert_array_equal(run(short(), "simd").signals, wanted)
+        assert compiler.count == count, what
+        forget(monkeypatch)
+        run(short(), "simd")
+        assert compiler.count == count, f"{what}: was not replaced"
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    for folder in (str(tmp_path / "file" / "below"), ""):
+        monkeypatch.setenv("ROTORFAULT_CACHE", folder)
+        forget(monkeypatch)
+        assert np.isfinite(run(short(), "simd").signals).all()
+    assert compiler.count == 2
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_key_tells_structures_apart() -> None:
+    def digest(**tables: Any) -> str:
+        return cache.key(assemble(short(**tables)).loop, "1").digest
+
+    base = digest()
+    assert digest() == base
+    assert digest(seed=9, fault=[{"kind": "step", "rotor": 2, "time": 0.2, "loss": 0.3}]) == base
+    others = [
+        digest(fault=[{"kind": "step", "rotor": 3, "time": 0.1, "loss": 0.2}]),
+        digest(fault=[]),
+        digest(controller={"kind": "smc", "preset": "none", "law": {"switching": "discontinuous"}}),
+        digest(controller={"kind": "smc", "preset": "none", "cascade": {"six_inputs": True}}),
+        digest(diagnosis={"kind": "delayed", "delay": 0.1}),
+        digest(diagnosis={"kind": "delayed", "delay": 0.2}),
+        digest(plant="paper_model"),
+        digest(step=0.001),
+        digest(sensors="ideal"),
+        cache.key(assemble(short()).loop, "2").digest,
+    ]
+    assert len({base, *others}) == 1 + len(others)
+
+
+def test_structure_is_one_word_per_part() -> None:
+    words = structure(assemble(short()).loop)
+    assert all(isinstance(word, str) for word in words)
+    assert "RigidBody" in words[0]

@@ -1,0 +1,385 @@
+"""The observer of thrust deviations and the decision: unbiased, blind to wind, exact in its counting."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rotorfault.assembly import assemble
+from rotorfault.config import validate
+from rotorfault.diagnosis import DIAGNOSES
+from rotorfault.diagnosis.decision import (
+    DecisionMemory,
+    DecisionParameters,
+    DecisionSettings,
+    decide,
+    decision_parameters,
+    relative_loss,
+    undecided,
+)
+from rotorfault.diagnosis.luenberger import Luenberger, LuenbergerSettings, place
+from rotorfault.diagnosis.protocol import DiagnosisInputs
+from rotorfault.diagnosis.rotor_model import RotorModel, expected_thrust, follow
+from rotorfault.engine import load_engine
+from rotorfault.engine.batch import no_watch
+from rotorfault.errors import InputError
+from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.plant import FAULTS, PLANTS, WINDS, Plant
+from rotorfault.scenario import scenario_from
+from rotorfault.signals import Command
+from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
+from rotorfault.vehicle_file import load_vehicle
+
+Array = NDArray[np.float64]
+VEHICLE = load_vehicle("paper").vehicle
+HOVER = hover_thrust(VEHICLE).r1
+T = 1e-3
+FORMS = ["injected", "linear", "lag_states"]
+SOUND = (0.0, 0.0, 0.0, 0.0)
+
+
+def arr(values: Any) -> Array:
+    return np.array(list(values), dtype=float)
+
+
+def observer(form: str = "injected", poles: tuple[float, float] = (120.0, 180.0), **decision: float) -> Luenberger:
+    return Luenberger(LuenbergerSettings(form=form, poles=poles, decision=DecisionSettings(**decision)))
+
+
+class Seen(NamedTuple):
+    """What the observer says over time, one row per sampling instant."""
+
+    residual: Array  # N
+    share: Array  # loss that the residual amounts to, before it is taken relative to the best rotor
+    estimate: Array
+    flagged: Array
+
+
+def watch(
+    made: Luenberger,
+    losses: tuple[float, float, float, float] = SOUND,
+    tilt: Vec3 | None = None,
+    wind_z: float = 0.0,
+    steps: int = 300,
+    vehicle: Vehicle = VEHICLE,
+    from_step: int = 0,
+) -> Seen:
+    """Run the observer beside the rigid body, whose commands make up for the losses from the step on where they act.
+
+    So each rotor delivers hover thrust and the body keeps its attitude, at any tilt; the observer knows the commands.
+    """
+    faults = [
+        FAULTS["step"](FAULTS["step"].Settings(rotor=i + 1, time=from_step * T, loss=loss))
+        for i, loss in enumerate(losses)
+        if loss > 0.0
+    ]
+    wind = WINDS["constant"](WINDS["constant"].Settings(velocity_W=(0.0, 0.0, wind_z)))
+    plant = Plant(PLANTS["rigid_body"](), wind, faults, 1)
+    numbers, parameters = plant.parameters(vehicle), made.parameters(vehicle, T)
+    share = PerRotor.of(1.0 - loss for loss in losses)
+    command = PerRotor.of(HOVER / s for s in share) if from_step == 0 else PerRotor.all(HOVER)
+    state = plant.initial(zeros(), zeros(), tilt or zeros(), zeros(), command, numbers)
+    rotors = RotorModel(lagged=command / vehicle.rotor_gain, mean=command)
+    before = plant.observe(state, 0.0, numbers).measurement
+    memory, elapsed, rows = made.initial(before, parameters), 0.0, []
+    for k in range(steps):
+        now = plant.observe(state, k * T, numbers).measurement
+        thrust = expected_thrust(rotors, vehicle)
+        speed = residual_speed(vehicle, rotor_speeds(vehicle, thrust))
+        inputs = DiagnosisInputs(now, before, vehicle, rotors.mean, thrust, speed, elapsed, PerRotor.all(math.nan))
+        memory, told = made.step(memory, inputs, parameters)
+        rows.append([arr(told.residual), -arr(told.residual) / arr(thrust), arr(told.estimate), arr(told.flagged)])
+        rotors = follow(rotors, command, vehicle, T)
+        state = plant.step(state, Command(command, zeros()), k * T, numbers, T)
+        before, elapsed = now, T
+    return Seen(*np.array(rows).transpose(1, 0, 2))
+
+
+# --------------------------------------------------------------------------------------------------- pole placement
+
+
+@pytest.mark.parametrize(("p", "q"), [(120.0, 180.0), (180.0, 120.0), (5.0, 900.0), (200.0, 202.0)])
+@pytest.mark.parametrize("period", [1e-3, 0.01, 0.02])
+@pytest.mark.parametrize("form", FORMS)
+def test_poles_are_where_they_were_asked_for(form: str, period: float, p: float, q: float) -> None:
+    made = observer(form, (p, q))
+    numbers = made.parameters(VEHICLE, period)
+    A = np.array([[1.0, numbers.carry], [0.0, numbers.decay]])
+    L = np.array([[numbers.gain_rate], [numbers.gain_deviation]])
+    # Current observer: its error after a measurement obeys (I - L C) A, with the eigenvalues of A (I - L C).
+    found = np.linalg.eigvals(A @ (np.eye(2) - L @ np.array([[1.0, 0.0]])))
+    np.testing.assert_allclose(np.sort(found), np.sort(np.exp([-p * period, -q * period])), atol=1e-9)
+
+
+def test_the_error_falls_at_the_placed_rates() -> None:
+    """The observer itself, not its matrices: the residual's error is c1 z1^k + c2 z2^k."""
+    p, q = 40.0, 90.0
+    seen = watch(observer(poles=(p, q)), (0.0, 0.0, 0.35, 0.0), steps=80)
+    gap = seen.residual[1:, 2] + 0.35 * HOVER / 0.65
+    z1, z2 = math.exp(-p * T), math.exp(-q * T)
+    predicted = (z1 + z2) * gap[1:-1] - z1 * z2 * gap[:-2]
+    np.testing.assert_allclose(gap[2:], predicted, atol=1e-6)
+    assert abs(gap[0]) > 1.0
+
+
+def test_place_is_a_solution_for_any_channel() -> None:
+    L1, L2 = place(2e-3, 0.9, (0.3, 0.7))
+    A = np.array([[1.0, 2e-3], [0.0, 0.9]])
+    found = np.linalg.eigvals(A @ (np.eye(2) - np.array([[L1, 0.0], [L2, 0.0]])))
+    np.testing.assert_allclose(np.sort(found), [0.3, 0.7], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [({"poles": [120.0, 120.0]}, "must differ"), ({"poles": [-1.0, 120.0]}, "would not converge")],
+)
+def test_poles_that_cannot_be_placed_are_refused(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        validate(LuenbergerSettings, settings, "test")
+
+
+def test_poles_too_fast_for_the_period_are_refused() -> None:
+    with pytest.raises(InputError, match=r"diagnosis\.poles: 400 rad/s at a sampling period of 0\.1 s.*300 rad/s"):
+        observer(poles=(120.0, 400.0)).parameters(VEHICLE, 0.1)
+
+
+# --------------------------------------------------------------------------------------------------------- estimates
+
+
+TILTS = [zeros(), Vec3(0.5, 0.0, 0.0), Vec3(-0.4, 0.7, 2.0), Vec3(0.0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("tilt", TILTS, ids=["level", "roll", "all", "pitch"])
+@pytest.mark.parametrize("losses", [SOUND, (0.25, 0.0, 0.35, 0.0), (0.0, 0.45, 0.0, 0.0), (0.1, 0.2, 0.0, 0.3)])
+def test_injected_is_unbiased_at_any_tilt(tilt: Vec3, losses: tuple[float, float, float, float]) -> None:
+    seen = watch(observer(), losses, tilt, steps=200)
+    np.testing.assert_allclose(seen.share[-1], losses, atol=1e-5)
+    np.testing.assert_allclose(seen.estimate[-1], losses, atol=1e-5)
+    np.testing.assert_array_equal(seen.flagged[-1], arr(losses) > 0.12)
+
+
+def test_a_healthy_rotor_hardly_notices_the_others() -> None:
+    """Crosstalk while the estimate converges and afterwards; the same poles in all channels keep the rotors apart."""
+    for hit in range(4):
+        losses = [0.0] * 4
+        losses[hit] = 0.35
+        seen = watch(observer(), tuple(losses), Vec3(0.3, -0.2, 0.4))  # type: ignore[arg-type]
+        others = np.delete(seen.share, hit, axis=1)
+        assert np.abs(others).max() < 2e-3
+        assert np.abs(others[-50:]).max() < 1e-5
+        assert seen.flagged[-1].tolist() == [float(i == hit) for i in range(4)]
+
+
+def closed_loop(engine: str = "python", **tables: Any) -> tuple[Array, dict[str, Array]]:
+    scenario = scenario_from(
+        {
+            "name": "test",
+            "vehicle": "paper",
+            "duration": 0.4,
+            "fault": [
+                {"kind": "step", "rotor": 1, "time": 0.1, "loss": 0.25},
+                {"kind": "step", "rotor": 3, "time": 0.1, "loss": 0.35},
+            ],
+            "reference": {"kind": "set_point", "position": [0.0, 0.0, 0.0]},
+        }
+        | tables,
+        "test",
+    )
+    recording = load_engine(engine)(assemble(scenario), no_watch)
+    parts = {
+        name: np.stack([recording.signals[:, SIGNAL_NAMES.index(f"{name}.r{i}"), 0] for i in (1, 2, 3, 4)], axis=1)
+        for name in ("loss_true", "loss_estimated", "loss_believed", "fault_flag")
+    }
+    return recording.steps * scenario.period, parts
+
+
+def test_the_loop_in_hover_finds_both_losses() -> None:
+    """With the reaction of the loop to the fault: detected at once, exact 0.2 s later, nothing seen before."""
+    time, parts = closed_loop()
+    assert parts["loss_estimated"][time < 0.0999].max() < 1e-9
+    np.testing.assert_allclose(parts["loss_estimated"][-1], [0.25, 0.0, 0.35, 0.0], atol=1e-3)
+    np.testing.assert_allclose(parts["loss_believed"][-1], [0.25, 0.0, 0.35, 0.0], atol=1e-3)
+    assert parts["fault_flag"][-1].tolist() == [1.0, 0.0, 1.0, 0.0]
+    assert not parts["fault_flag"][:, [1, 3]].any()
+    for rotor, most in ((0, 0.022), (2, 0.019)):
+        delay = time[np.argmax(parts["fault_flag"][:, rotor] > 0.5)] - 0.1
+        assert 0.008 < delay <= most + 1e-9
+
+
+def test_linear_at_a_tilt_sees_losses_that_are_not_there() -> None:
+    """60 degrees: the vertical part of the thrust is missing, half of it, which `linear` puts on all four rotors."""
+    tilt = Vec3(0.0, math.pi / 3.0, 0.0)
+    blind = watch(observer("linear"), tilt=tilt, vehicle=VEHICLE._replace(linear_drag=0.0))
+    np.testing.assert_allclose(blind.share[-1], 0.5, atol=1e-6)
+    # It is nobody's fault, and the decision blames nobody.
+    assert not blind.flagged.any()
+    assert np.abs(watch(observer("injected"), tilt=tilt).share).max() < 1e-6
+
+
+def test_linear_is_as_good_in_level_hover() -> None:
+    losses = (0.25, 0.0, 0.35, 0.0)
+    np.testing.assert_allclose(watch(observer("linear"), losses).share[-1], losses, atol=1e-3)
+
+
+@pytest.mark.parametrize(("w0", "p", "q"), [(50.0, 200.0, 201.0), (50.0, 120.0, 180.0), (15.0, 200.0, 201.0)])
+def test_lag_states_is_biased(w0: float, p: float, q: float) -> None:
+    """It reports the share (1 - w0/p)(1 - w0/q) of a loss, 0.56 for 50 and 200 rad/s, for good."""
+    vehicle = VEHICLE._replace(rotor_bandwidth=w0)
+    losses = (0.0, 0.0, 0.35, 0.0)
+    share = watch(observer("lag_states", (p, q)), losses, vehicle=vehicle).share[-1, 2] / 0.35
+    # In discrete time, with the poles' images: the limit for fast sampling is the product above.
+    a, zp, zq = math.exp(-w0 * T), math.exp(-p * T), math.exp(-q * T)
+    assert share == pytest.approx((a - zp) * (a - zq) / (a * (1.0 - zp) * (1.0 - zq)), abs=0.02)
+    assert share == pytest.approx((1.0 - w0 / p) * (1.0 - w0 / q), abs=0.06)
+
+
+@pytest.mark.parametrize("wind_z", [-30.0, -3.6, 3.6])
+def test_vertical_wind_is_nobodys_fault(wind_z: float) -> None:
+    """It looks like the same loss k_d w/(mg) on all four rotors."""
+    seen = watch(observer(), wind_z=wind_z, steps=150)
+    apparent = -VEHICLE.linear_drag * wind_z / (VEHICLE.mass * VEHICLE.gravity)
+    np.testing.assert_allclose(seen.share[-1], apparent, rtol=1e-3)
+    assert np.ptp(seen.share[-1]) < 1e-9
+    assert not seen.flagged.any()
+    assert seen.estimate.max() < 1e-6
+    # A true loss in this wind is still found, against the rotors that are sound.
+    windy = watch(observer(), (0.0, 0.35, 0.0, 0.0), wind_z=wind_z, steps=150)
+    assert windy.flagged[-1].tolist() == [0.0, 1.0, 0.0, 0.0]
+
+
+def test_an_equal_loss_of_all_is_the_price() -> None:
+    seen = watch(observer(), (0.2, 0.2, 0.2, 0.2))
+    np.testing.assert_allclose(seen.share[-1], 0.2, atol=1e-5)
+    assert not seen.flagged.any()
+
+
+# ----------------------------------------------------------------------------------------------------------- decision
+
+
+def decisions(
+    losses: list[float], dt: float, start: DecisionMemory | None = None, **settings: float
+) -> tuple[Array, DecisionMemory]:
+    """Flag of rotor 2 after each sample of its loss, at hover thrust."""
+    parameters = decision_parameters(DecisionSettings(**settings))
+    memory, flags = start or undecided(), []
+    for loss in losses:
+        residual = PerRotor(0.0, -loss * HOVER, 0.0, 0.0)
+        memory, told = decide(memory, residual, PerRotor.all(HOVER), VEHICLE, parameters, dt)
+        flags.append(told.flagged.r2)
+        assert told.flagged.r1 == told.flagged.r3 == told.flagged.r4 == 0.0
+    return np.array(flags), memory
+
+
+def first(flags: Array, value: float) -> int:
+    """Number of samples until the flag has a value, that one included; 0 for never."""
+    hits = np.flatnonzero(flags == value)
+    return int(hits[0]) + 1 if len(hits) else 0
+
+
+def test_threshold() -> None:
+    assert first(decisions([0.1199999] * 200, T)[0], 1.0) == 0
+    assert first(decisions([0.1200001] * 200, T)[0], 1.0) == 8
+    assert first(decisions([0.2] * 200, T, threshold=0.3)[0], 1.0) == 0
+
+
+@pytest.mark.parametrize("dt", [1e-4, 1e-3, 2e-3, 3e-3, 0.01, 0.1])
+@pytest.mark.parametrize("persistence", [0.0, 0.008, 0.03, 0.3])
+def test_persistence_is_counted_exactly(dt: float, persistence: float) -> None:
+    """In samples, however the sum of the periods is rounded: as many as come nearest, one at least."""
+    nearest = max(1, math.ceil(persistence / dt - 0.5 - 1e-9))
+    flags, _ = decisions([0.5] * (nearest + 5), dt, persistence=persistence)
+    assert first(flags, 1.0) == nearest
+    # One sample less, then one below, and the count starts anew.
+    broken = [*[0.5] * (nearest - 1), 0.1, *[0.5] * (nearest + 5)]
+    assert first(decisions(broken, dt, persistence=persistence)[0], 1.0) == 2 * nearest
+
+
+@pytest.mark.parametrize("dt", [1e-3, 7e-3, 0.01])
+def test_clearing_has_hysteresis(dt: float) -> None:
+    raised = decisions([0.5] * 50, dt)[1]
+    count = math.ceil(0.2 / dt - 0.5)
+    # Between the thresholds nothing changes, for any length of time.
+    flags, _ = decisions([0.09] * (3 * count), dt, raised)
+    assert flags.all()
+    flags, _ = decisions([0.05] * (count + 5), dt, raised)
+    assert first(flags, 0.0) == count
+    # One sample above the lower threshold starts the count anew.
+    flags, _ = decisions([*[0.05] * (count - 1), 0.07, *[0.05] * (count + 5)], dt, raised)
+    assert first(flags, 0.0) == 2 * count
+    # And what was cleared is raised again as the first time.
+    cleared = decisions([0.0] * (count + 1), dt, raised)[1]
+    assert first(decisions([0.5] * 50, dt, cleared)[0], 1.0) == max(1, math.ceil(0.008 / dt - 0.5))
+
+
+def test_what_is_no_number_decides_nothing() -> None:
+    """NaN neither raises a flag nor clears one, and does not count towards either."""
+    assert not decisions([math.nan] * 300, T)[0].any()
+    assert first(decisions([*[0.5] * 7, math.nan, *[0.5] * 7], T)[0], 1.0) == 0
+    raised = decisions([0.5] * 50, T)[1]
+    assert decisions([math.nan] * 500, T, raised)[0].all()
+    assert decisions([*[0.01] * 199, math.nan, *[0.01] * 199], T, raised)[0].all()
+
+
+@given(
+    st.lists(st.floats(-5.0, 5.0), min_size=4, max_size=4),
+    st.lists(st.floats(0.0, 9.0), min_size=4, max_size=4),
+    st.floats(-3.0, 3.0),
+)
+def test_relative_loss(residual: list[float], thrust: list[float], common: float) -> None:
+    found = arr(relative_loss(PerRotor(*residual), PerRotor(*thrust), VEHICLE))
+    assert ((found >= 0.0) & (found <= 1.0)).all()
+    assert found[int(np.argmax(residual))] == 0.0  # the best is never blamed
+    expected = (max(residual) - np.array(residual)) / np.maximum(thrust, 0.05 * VEHICLE.thrust_max)
+    np.testing.assert_allclose(found, np.clip(expected, 0.0, 1.0), atol=1e-12)
+    shifted = relative_loss(PerRotor(*(r + common for r in residual)), PerRotor(*thrust), VEHICLE)
+    np.testing.assert_allclose(arr(shifted), found, atol=1e-12)
+
+
+def test_smoothing_is_first_order_from_the_first_suspicion() -> None:
+    parameters = decision_parameters(DecisionSettings())
+    memory, believed = undecided(), []
+    losses = [0.5] * 8 + [0.3] * 60
+    for loss in losses:
+        residual = PerRotor(-loss * HOVER, 0.0, 0.0, 0.0)
+        memory, told = decide(memory, residual, PerRotor.all(HOVER), VEHICLE, parameters, T)
+        believed.append(told.loss.r1)
+    assert believed[:7] == [0.0] * 7  # not flagged yet: nothing is believed
+    assert believed[7] == pytest.approx(0.5)
+    k = np.arange(1, 61)
+    np.testing.assert_allclose(believed[8:], 0.3 + 0.2 * np.exp(-k * T / 0.025), atol=1e-12)
+    none = DecisionParameters(*parameters)._replace(smoothing=0.0)
+    _, told = decide(memory, PerRotor(-0.4 * HOVER, 0.0, 0.0, 0.0), PerRotor.all(HOVER), VEHICLE, none, T)
+    assert told.loss.r1 == pytest.approx(0.4)
+
+
+def test_thresholds_out_of_order_are_refused() -> None:
+    with pytest.raises(InputError, match=r"clear_threshold 0\.2 must not exceed threshold 0\.12"):
+        validate(DecisionSettings, {"clear_threshold": 0.2}, "test")
+
+
+# ------------------------------------------------------------------------------------------------------------ delays
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1])
+def test_oracle_and_delayed_tell_the_truth_when_they_should(delay: float) -> None:
+    diagnosis: dict[str, Any] = {"kind": "delayed", "delay": delay} if delay else {"kind": "oracle"}
+    time, parts = closed_loop(diagnosis=diagnosis, duration=0.25)
+    told = (time >= 0.1 + delay - 1e-9)[:, None]
+    np.testing.assert_array_equal(parts["fault_flag"], told * [1.0, 0.0, 1.0, 0.0])
+    np.testing.assert_allclose(parts["loss_believed"], told * [0.25, 0.0, 0.35, 0.0], atol=1e-15)
+
+
+def test_only_oracles_are_told_the_truth() -> None:
+    """A source without an oracle's delay gets zeros, whatever the truth is: no flag without a motion to see."""
+    for kind in DIAGNOSES:
+        made = DIAGNOSES[kind](DIAGNOSES[kind].Settings())
+        time, parts = closed_loop(diagnosis=kind, duration=0.102)
+        at_once = parts["fault_flag"][time >= 0.0999].any()
+        assert at_once == (made.oracle_delay == 0.0)
