@@ -52,8 +52,9 @@ test: .venv/.stamp-develop ## Run the tests
 test-numpy: .venv-numpy/.stamp ## Run the tests without heyoka, in .venv-numpy
 	.venv-numpy/bin/python -m pytest -n 2
 
-lint: .venv/.stamp-develop ## Check style with ruff
+lint: .venv/.stamp-develop ## Check style and format with ruff
 	.venv/bin/ruff check
+	.venv/bin/ruff format --check
 
 types: .venv/.stamp-develop ## Check types with mypy
 	.venv/bin/mypy

@@ -37,7 +37,9 @@ class PdBlock:
         """No memory."""
         return ()
 
-    def step(self, memory: tuple[()], inputs: ControlInputs, parameters: Gains, dt: Scalar) -> tuple[Any, ControlOutput]:
+    def step(
+        self, memory: tuple[()], inputs: ControlInputs, parameters: Gains, dt: Scalar
+    ) -> tuple[Any, ControlOutput]:
         """Wrench for one sampling period."""
         g, seen, wanted, vehicle = parameters, inputs.measurement, inputs.reference, inputs.vehicle
         a_W = (

@@ -94,7 +94,7 @@ def test_list_names_everything_registered() -> None:
 def test_trim_prints_margins() -> None:
     done = run("trim", "paper")
     assert done.returncode == 0, done.stderr
-    for word in ("hover", "poles", "gain margin", "delay margin"):
+    for word in ("hover", "linearisation", "poles", "gain up", "gain down", "delay [ms]"):
         assert word in done.stdout.lower()
 
 

@@ -99,7 +99,7 @@ def test_numpy_agrees_with_simd() -> None:
 
 
 def test_force_limit_stays_real_on_compiled_code() -> None:
-    """Fused operations round a^2 - b^2 once: where a = b it fell below zero under the root, and the flight was lost."""
+    """Fused operations round a^2 - b^2 once: where a = b that fell below zero under the root."""
     hy = pytest.importorskip("heyoka")
     vehicle = load_vehicle("paper").vehicle
     x, y, z, share = hy.make_vars("x", "y", "z", "share")

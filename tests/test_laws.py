@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_continuous_are
 from scipy.signal import cont2discrete
 
+from rotorfault.allocation.attainable import thrust_available
 from rotorfault.assembly import assemble, assemble_all
 from rotorfault.config import validate
 from rotorfault.control import CONTROLLERS
-from rotorfault.allocation.attainable import thrust_available
 from rotorfault.control.cascade import (
     AttitudeReference,
     Cascade,
@@ -33,7 +33,7 @@ from rotorfault.control.smc import MATCH_AT, Smc
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.errors import InputError
-from rotorfault.geometry import Mat3, Vec3, body_z_axis, zeros
+from rotorfault.geometry import Mat3, PerRotor, Vec3, body_z_axis, zeros
 from rotorfault.plant.models import acceleration, angular_acceleration
 from rotorfault.plant.wind import Air
 from rotorfault.scenario import Scenario, scenario_from
@@ -79,7 +79,9 @@ def controller_step(made: Cascade, vehicle: Vehicle, seen: Measurement, wanted: 
     if "reference" in inputs:
         memory = memory._replace(reference=inputs["reference"])
     residual = inputs.get("residual", 0.0)
-    after, output = made.step(memory, ControlInputs(seen, wanted, vehicle, NOTHING, residual, thrust_available(vehicle, PerRotor.all(0.0))), numbers, 1e-3)
+    available = thrust_available(vehicle, PerRotor.all(0.0))
+    given_ = ControlInputs(seen, wanted, vehicle, NOTHING, residual, available)
+    after, output = made.step(memory, given_, numbers, 1e-3)
     return memory, after, output
 
 

@@ -57,7 +57,8 @@ def row(label: str, settings: dict[str, Any]) -> str:
         return "-" if value is None else f"{value:{digits}}"
 
     hits = ", ".join(
-        f"{h['rotor']}: " + ("missed" if h["delay"] is None else f"{1e3 * h['delay']:.0f} ms, {text(h['loss_estimated'])}")
+        f"{h['rotor']}: "
+        + ("missed" if h["delay"] is None else f"{1e3 * h['delay']:.0f} ms, {text(h['loss_estimated'])}")
         for h in s["detections"]
     )
     return (
@@ -81,7 +82,10 @@ def neighbours(count: int, controller: str) -> str:
         survived += flight.outcome.survived
         settled += flight.outcome.survived and not late.any()
         flagged += (data["fault_flag"].values[-1] > 0.5).tolist() == [True, False, True, False]
-    return f"{controller}: of {count} neighbours {survived} survive, {settled} settle in time, {flagged} flag exactly 1 and 3"
+    return (
+        f"{controller}: of {count} neighbours {survived} survive, {settled} settle in time, "
+        f"{flagged} flag exactly rotors 1 and 3"
+    )
 
 
 def main() -> None:

@@ -196,7 +196,8 @@ def main() -> None:
 
     def evaluate(points: list[np.ndarray]) -> list[float]:
         tables = [
-            {"kind": arguments.controller, "preset": "none", **settings(arguments.controller, values(x))} for x in points
+            {"kind": arguments.controller, "preset": "none", **settings(arguments.controller, values(x))}
+            for x in points
         ]
         parts = [type(base).model_validate({**dict(base), "controller": table}).controller for table in tables]
         blocks = []

@@ -108,8 +108,4 @@ def _first_noise(seeds: tuple[tuple[int, int], ...]) -> Normals:
 
 def reference_rows(table: ReferenceTable) -> Array:
     """A reference table as rows (n, 12) in the order of `Reference`."""
-    return np.column_stack(
-        [table.p_W, table.v_W, table.a_W, table.yaw, table.yaw_rate, table.yaw_acceleration]
-    )
-
-
+    return np.column_stack([table.p_W, table.v_W, table.a_W, table.yaw, table.yaw_rate, table.yaw_acceleration])

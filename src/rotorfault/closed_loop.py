@@ -72,14 +72,10 @@ class ClosedLoop:
 
     def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
-        plant = self.plant.initial(
-            *start, hover_thrust(parameters.autopilot.vehicle), parameters.plant
-        )
+        plant = self.plant.initial(*start, hover_thrust(parameters.autopilot.vehicle), parameters.plant)
         truth = self.plant.observe(plant, 0.0, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
-        return LoopState(
-            plant, self.autopilot.initial(measurement, drive.reference, parameters.autopilot), 0.0
-        )
+        return LoopState(plant, self.autopilot.initial(measurement, drive.reference, parameters.autopilot), 0.0)
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
         """One sampling period: the state after it, and the signals at its beginning."""

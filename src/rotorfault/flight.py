@@ -76,14 +76,20 @@ class Flight:
         for name, variable in self.data.data_vars.items():
             flat = variable.values.reshape(len(columns["time"]), -1)
             labels = [
-                "_".join([str(name), *(str(self.data[dim].values[i]) for dim, i in zip(variable.dims[1:], at, strict=True))])
+                "_".join(
+                    [
+                        str(name),
+                        *(str(self.data[dim].values[i]) for dim, i in zip(variable.dims[1:], at, strict=True)),
+                    ]
+                )
                 for at in np.ndindex(variable.shape[1:])
             ]
             columns.update(zip(labels, flat.T, strict=True))
         table = np.column_stack(list(columns.values()))
         header = ",".join(columns)
         write_atomically(
-            path, lambda temporary: np.savetxt(temporary, table, fmt="%.9g", delimiter=",", header=header, comments="")
+            path,
+            lambda temporary: np.savetxt(temporary, table, fmt="%.9g", delimiter=",", header=header, comments=""),
         )
         return path
 
@@ -153,7 +159,9 @@ def fly(
     python_only = getattr(batch.loop.autopilot.controller, "python_only", False)
     name = engine or ("python" if python_only else default_engine(1))
     if name != "python" and python_only:
-        raise InputError(f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'")
+        raise InputError(
+            f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
+        )
     recording = _run(batch, name, [checked])
     return _flight(checked, recording, 0, name, None if own is None else type(controller).__name__)
 

@@ -33,7 +33,7 @@ class Value:
         return f"{type(self).__name__}({inside})"
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and all(a == b for a, b in zip(self, other, strict=True))  # type: ignore[call-overload]
+        return type(other) is type(self) and all(a == b for a, b in zip(self, other, strict=True))
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -171,7 +171,8 @@ class Mat3(Value):
     __rmul__ = __mul__
 
     def __truediv__(self, divisor: Scalar) -> Mat3:
-        return self * (1.0 / divisor)
+        quotient: Mat3 = self * (1.0 / divisor)
+        return quotient
 
     @overload
     def __matmul__(self, other: Vec3) -> Vec3: ...
@@ -222,7 +223,8 @@ class Mat3(Value):
 
     def inverse(self) -> Mat3:
         """Inverse by the adjugate; not for near-singular matrices."""
-        return self.adjugate() * (1.0 / self.det())
+        inverse: Mat3 = self.adjugate() * (1.0 / self.det())
+        return inverse
 
     def norm(self) -> Scalar:
         """Frobenius norm."""
@@ -346,7 +348,8 @@ class Quat(Value):
 
     def normalised(self) -> Quat:
         """The unit quaternion along this one."""
-        return self * (1.0 / sqrt(self.dot(self)))
+        unit: Quat = self * (1.0 / sqrt(self.dot(self)))
+        return unit
 
     def derivative(self, omega_B: Vec3) -> Quat:
         """Time derivative q_dot = q (0, omega_B) / 2 for body rates in rad/s."""
@@ -392,4 +395,3 @@ def body_z_axis(euler: Vec3) -> Vec3:
 def zeros() -> Vec3:
     """The zero vector."""
     return Vec3(0.0, 0.0, 0.0)
-

@@ -78,10 +78,7 @@ def first_loss(signals: Array, ground: float | None) -> tuple[int, str] | None:
 def bands(data: xr.Dataset, share: float) -> NDArray[np.float64]:
     """Half width per axis [m] within which an error counts as small."""
     reference, start = data["position_reference"].values, data["position"].values[0]
-    if constant_reference(data):
-        size = np.abs(reference[0] - start)
-    else:
-        size = np.ptp(reference, axis=0)
+    size = np.abs(reference[0] - start) if constant_reference(data) else np.ptp(reference, axis=0)
     largest = float(size.max())
     size = np.where(size > 1e-9, size, largest if largest > 1e-9 else 1.0)
     return np.asarray(share * size)

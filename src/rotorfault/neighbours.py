@@ -10,7 +10,9 @@ import numpy as np
 from rotorfault.scenario import Mismatch, Part, Scenario, Start
 
 
-def neighbour(scenario: Scenario, seed: int, spread: float = 0.1, onset: tuple[float, float] = (0.5, 5.0)) -> Scenario:
+def neighbour(
+    scenario: Scenario, seed: int, spread: float = 0.1, onset: tuple[float, float] = (0.5, 5.0)
+) -> Scenario:
     """A seeded neighbour.
 
     Parameters

@@ -76,9 +76,7 @@ REFERENCES: Registry[type[ReferenceSource]] = Registry("reference")
 
 def _table(four: Array, rate: Array, acceleration: Array) -> ReferenceTable:
     """Table of arrays (n, 4) with the columns x, y, z, yaw and their derivatives."""
-    return ReferenceTable(
-        four[:, :3], rate[:, :3], acceleration[:, :3], four[:, 3], rate[:, 3], acceleration[:, 3]
-    )
+    return ReferenceTable(four[:, :3], rate[:, :3], acceleration[:, :3], four[:, 3], rate[:, 3], acceleration[:, 3])
 
 
 @REFERENCES.register("set_point")

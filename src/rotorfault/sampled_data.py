@@ -23,7 +23,7 @@ import numpy as np
 
 from rotorfault.allocation.attainable import thrust_available
 from rotorfault.control.protocol import ControlInputs, ControlOutput, Prediction
-from rotorfault.geometry import Vec3, zeros
+from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.linearisation import Complex
 from rotorfault.scenario import Scenario
 from rotorfault.signals import Measurement, Reference
@@ -107,7 +107,9 @@ def reported_gains(
     def first_step(seen: Measurement) -> ControlOutput:
         numbers = controller.parameters(vehicle, period)
         memory = controller.initial(seen, reference, numbers)
-        inputs = ControlInputs(seen, reference, vehicle, Prediction(zeros(), zeros()), 0.0, thrust_available(vehicle, PerRotor.all(0.0)))
+        inputs = ControlInputs(
+            seen, reference, vehicle, Prediction(zeros(), zeros()), 0.0, thrust_available(vehicle, PerRotor.all(0.0))
+        )
         output: ControlOutput = controller.step(memory, inputs, numbers, period)[1]
         return output
 

@@ -171,7 +171,9 @@ class Scenario(Strict):
         if self.step is not None and self.step > self.period * (1.0 + PERIOD_TOLERANCE):
             raise refusal("step", f"got {self.step:g} s; allowed: at most the sampling period, {self.period:g} s")
         if self.step is not None and not _divides(self.step, self.period):
-            raise refusal("step", f"got {self.step:g} s; allowed: the sampling period {self.period:g} s over 1, 2, 3 ..")
+            raise refusal(
+                "step", f"got {self.step:g} s; allowed: the sampling period {self.period:g} s over 1, 2, 3 .."
+            )
         if self.record_period is not None and not _divides(self.period, self.record_period):
             raise refusal(
                 "record_period", f"got {self.record_period:g} s; allowed: a multiple of the period {self.period:g} s"
@@ -296,7 +298,9 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
 def _index(items: list[Any], part: str, key: str) -> int:
     if not part.isdigit() or int(part) >= len(items):
-        raise InputError(f"--set {key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}")
+        raise InputError(
+            f"--set {key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}"
+        )
     return int(part)
 
 
@@ -329,6 +333,8 @@ def new_scenario(name: str) -> str:
         If the name is empty or contains quotation marks, backslashes or line breaks.
     """
     if not name or any(character in '"\\' or not character.isprintable() for character in name):
-        raise InputError(f"scenario name {name!r}; allowed: printable characters without quotation marks or backslash")
+        raise InputError(
+            f"scenario name {name!r}; allowed: printable characters without quotation marks or backslash"
+        )
     template = (resources.files("rotorfault.scenarios") / "template.txt").read_text(encoding="utf-8")
     return template.replace("NAME", name)

@@ -71,7 +71,12 @@ class Signals(NamedTuple):
 
 
 def _template() -> Any:
-    parts: dict[Any, Any] = {Scalar: 0.0, Vec3: Vec3(0.0, 0.0, 0.0), PerRotor: PerRotor.all(0.0), Mat3: Mat3.identity()}
+    parts: dict[Any, Any] = {
+        Scalar: 0.0,
+        Vec3: Vec3(0.0, 0.0, 0.0),
+        PerRotor: PerRotor.all(0.0),
+        Mat3: Mat3.identity(),
+    }
     return Signals(**{name: parts[kind] for name, (kind, _) in quantities().items()})
 
 

@@ -24,6 +24,7 @@ from rotorfault.control.cascade import attitude_for
 from rotorfault.diagnosis import DIAGNOSES
 from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.hover_model import equations
 from rotorfault.linearisation import AXES, DEADBEAT, LinearLoop, linearise
 from rotorfault.margins import Margins, margins
 from rotorfault.plant import PLANTS, SENSORS, WINDS
@@ -68,7 +69,8 @@ class TrimReport(NamedTuple):
 
     def text(self) -> str:
         """Plain text for a terminal of 100 columns."""
-        parts = (_hover_lines(self), _pole_lines(self), _margin_lines(self), _warning_lines(self))
+        model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
+        parts = (_hover_lines(self), model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
@@ -94,9 +96,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         attitude=attitude_for(force_W, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
         thrust_margin=4.0 * k * vehicle.thrust_max / needed,
-        torque_max=Vec3.of(
-            _most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()
-        ),
+        torque_max=Vec3.of(_most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
     )
 
 

@@ -48,7 +48,10 @@ class CascadeSettings(Strict):
 
     tilt_max: float = Field(default=0.9, gt=0.0, lt=1.5, description="largest demanded tilt [rad]")
     thrust_share: float = Field(
-        default=0.95, gt=0.0, le=1.0, description="share of the thrust that the believed rotors have in balance, for position control"
+        default=0.95,
+        gt=0.0,
+        le=1.0,
+        description="share of the thrust that the believed rotors have in balance, for position control",
     )
     fall_share: float = Field(
         default=0.3, gt=0.0, lt=1.0, description="least vertical specific force demanded, as a share of gravity"

@@ -98,4 +98,3 @@ def as_controller(given: Any) -> Controller:
         f"controller {type(given).__name__}: allowed are the name of a registered controller, a block with "
         "parameters, initial and step, or an object with update"
     )
-

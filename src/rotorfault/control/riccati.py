@@ -83,9 +83,7 @@ def attitude_problem(drift: Mat3, b: Vec3, q_angle: Vec3, q_rate: Vec3, r: Vec3)
     """
     S = Vec3.of(b_i / sqrt(r_i) for b_i, r_i in zip(b, r, strict=True))
     W = Mat3.diagonal(S.map(lambda s: 1.0 / s)) @ drift @ Mat3.diagonal(S)
-    return AttitudeProblem(
-        W, Mat3.diagonal(q_angle.times(S.times(S))), Mat3.diagonal(q_rate.times(S.times(S))), S
-    )
+    return AttitudeProblem(W, Mat3.diagonal(q_angle.times(S.times(S))), Mat3.diagonal(q_rate.times(S.times(S))), S)
 
 
 def feedback(problem: AttitudeProblem, gain: Gain) -> tuple[Mat3, Mat3]:
@@ -312,7 +310,5 @@ def _positive_definite(P11: Mat3, P21: Mat3, P22: Mat3) -> Scalar:
         positive = both(positive, greater(pivot, 0.0))
         reciprocal = _reciprocal(pivot)
         scaled = [c * reciprocal for c in column]
-        rows = [
-            [a - scaled[i] * column[j] for j, a in enumerate(row[1:])] for i, row in enumerate(rows[1:])
-        ]
+        rows = [[a - scaled[i] * column[j] for j, a in enumerate(row[1:])] for i, row in enumerate(rows[1:])]
     return positive

@@ -30,16 +30,16 @@ class Weights(Strict):
     attitude_q_angle: Three = Field(default=(1.0, 1.0, 1.0), description="Q on roll, pitch, yaw error [1/rad^2]")
     attitude_q_rate: Three = Field(default=(1.0, 1.0, 1.0), description="Q on their rates [s^2/rad^2]")
     attitude_r: Three = Field(default=(0.0088, 0.0088, 0.0088), description="R on angular acceleration [s^4/rad^2]")
-    position_q: Three = Field(default=(0.3, 0.3, 0.3), description="numerator of Q on x, y, z error, q1 = value/|e| [1/m]")
+    position_q: Three = Field(
+        default=(0.3, 0.3, 0.3), description="numerator of Q on x, y, z error, q1 = value/|e| [1/m]"
+    )
     position_q_rate: Three = Field(default=(0.005, 0.005, 0.005), description="Q on velocity error [s^2/m^2]")
     position_r: Three = Field(default=(0.2, 0.2, 0.4), description="factor of R, r = value e^2 [s^4/m^4]")
     error_floor: Three = Field(default=(0.1, 0.1, 0.1), description="smooth floor of |e| in Q and R, x, y, z [m]")
     error_cap: Three = Field(default=(1e6, 1e6, 1e6), description="smooth cap of |e| in Q and R, x, y, z [m]")
     newton_steps: int = Field(default=1, ge=1, le=20, description="Newton-Kleinman steps per sampling instant")
 
-    @field_validator(
-        "attitude_q_angle", "attitude_r", "position_q", "position_r", "error_floor", "error_cap"
-    )
+    @field_validator("attitude_q_angle", "attitude_r", "position_q", "position_r", "error_floor", "error_cap")
     @classmethod
     def _positive(cls, value: Three) -> Three:
         if not min(value) > 0.0:

@@ -56,9 +56,7 @@ class SmcSettings(Strict):
         description="x, y, z",
     )
     attitude: SlidingSettings = Field(
-        default=SlidingSettings(
-            slope=(10.0, 10.0, 5.0), reaching=(10.0, 10.0, 5.0), K=(60.0, 60.0, 20.0), layer=4.0
-        ),
+        default=SlidingSettings(slope=(10.0, 10.0, 5.0), reaching=(10.0, 10.0, 5.0), K=(60.0, 60.0, 20.0), layer=4.0),
         description="roll, pitch, yaw",
     )
     match: Weights | None = Field(
@@ -154,10 +152,12 @@ class Smc:
 
     def parameters(self, vehicle: Vehicle, period: float) -> SmcParameters:
         """Numbers of the law."""
-        return SmcParameters(*(
-            SlidingParameters(Vec3.of(s.slope), Vec3.of(s.reaching), Vec3.of(s.K), s.layer)
-            for s in (self.settings.position, self.settings.attitude)
-        ))
+        return SmcParameters(
+            *(
+                SlidingParameters(Vec3.of(s.slope), Vec3.of(s.reaching), Vec3.of(s.K), s.layer)
+                for s in (self.settings.position, self.settings.attitude)
+            )
+        )
 
     def initial(self, position: TrackingError, attitude: TrackingError, parameters: SmcParameters) -> SmcMemory:
         """Nothing to remember."""
@@ -184,6 +184,4 @@ class Smc:
         u = -slope.times(error.e_dot) - reaching.times(s) - K.times(switch)
         # Gains of the linear range, for the record and the linearisation.
         steep = reaching + K / layer if self.settings.switching == "smooth" else reaching
-        return LawOutput(
-            u, s, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), 0.0, 0.0
-        )
+        return LawOutput(u, s, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), 0.0, 0.0)

@@ -10,8 +10,8 @@ all four is not seen, which no observer of the body's motion could tell from win
 
 An inertia that is wrong by a share e makes the model miss a share e of every torque, which looks like lost thrust on
 one rotor and gained thrust on its partner. The threshold therefore adapts to what the rotors are doing: with the
-spread s_i = |F_i - F_partner| + |S12 - S34|/2 of the expected thrusts in N (its peak, forgotten with the time constant
-``memory``), rotor i is *suspected* while
+spread s_i = |F_i - F_partner| + |S12 - S34|/2 of the expected thrusts in N (its peak, forgotten with the time
+constant ``memory``), rotor i is *suspected* while
 
     max_j r_j - r_i > threshold F_i + uncertainty s_i.
 
@@ -69,9 +69,7 @@ class DecisionSettings(Strict):
     @model_validator(mode="after")
     def _ordered(self) -> DecisionSettings:
         if not self.clear_threshold <= self.threshold:
-            raise ValueError(
-                f"clear_threshold {self.clear_threshold:g} must not exceed threshold {self.threshold:g}"
-            )
+            raise ValueError(f"clear_threshold {self.clear_threshold:g} must not exceed threshold {self.threshold:g}")
         return self
 
 

@@ -168,9 +168,7 @@ class Luenberger:
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
         delta_z = delta_z + parameters.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * parameters.gain_deviation
-        residual = nominal_inverse(
-            vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega))
-        )
+        residual = nominal_inverse(vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega)))
         decision, diagnosis = decide(memory.decision, residual, inputs.thrust, vehicle, parameters.decision, dt)
         after = LuenbergerMemory(
             climb=climb + parameters.gain_rate * innovation_z,

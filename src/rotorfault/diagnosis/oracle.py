@@ -107,5 +107,3 @@ class Off:
     def step(self, memory: tuple[()], inputs: DiagnosisInputs, parameters: tuple[()]) -> tuple[tuple[()], Diagnosis]:
         """Blame nobody."""
         return memory, healthy()
-
-

@@ -56,4 +56,3 @@ def run(batch: Batch, watch: Watch) -> Recording:
     except KeyboardInterrupt:
         return recording(records, steps, interrupted=True)
     return recording(records, steps, interrupted=False)
-

@@ -58,7 +58,10 @@ def run(batch: Batch, watch: Watch) -> Recording:
         # Spare lanes fly the last flight again: a lane of zeros could cost time in NaN or denormal arithmetic.
         return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, padded - batch.flights)), mode="edge"))
 
-    parameters, start = widened(columns(batch.parameters, batch.flights)), widened(columns(batch.state, batch.flights))
+    parameters, start = (
+        widened(columns(batch.parameters, batch.flights)),
+        widened(columns(batch.state, batch.flights)),
+    )
     n_drive, n_state = len(flatten(drive_template(batch))), len(start)
     n_rows = n_drive + len(step.fn)
     buffers = [np.zeros((n_rows, padded)) for _ in range(2)]

@@ -102,5 +102,3 @@ def _shade_flags(axes: Axes, drawn: Sequence[Drawn], rotor: int) -> None:
             linewidth=0.0,
             zorder=0.8,
         )
-
-

@@ -116,5 +116,3 @@ def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
             told.add(name)
             handles.append(sample(name, **style))
     return handles
-
-

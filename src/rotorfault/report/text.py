@@ -54,7 +54,9 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
 
 def summary_text(summary: dict[str, Any]) -> str:
     """A flight's numbers, a line each."""
-    head = f"{summary['scenario']} flown by {summary['controller']} on {summary['plant']} ({summary['engine']} engine)"
+    head = (
+        f"{summary['scenario']} flown by {summary['controller']} on {summary['plant']} ({summary['engine']} engine)"
+    )
     lines = rows(summary)
     width = max(len(label) for label, _ in lines)
     return "\n".join([head, *(f"  {label.ljust(width)}  {text}" for label, text in lines)])
