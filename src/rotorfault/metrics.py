@@ -101,7 +101,8 @@ def judge(data: xr.Dataset) -> str:
 def settle_times(data: xr.Dataset) -> dict[str, float | None]:
     """Settling time per axis and overall in s; None where it never settles."""
     time = data["time"].values
-    outside = np.abs(data["position"].values - data["position_reference"].values) > bands(data, SETTLED)
+    # "Not inside", so that NaN counts as outside.
+    outside = ~(np.abs(data["position"].values - data["position_reference"].values) <= bands(data, SETTLED))
     found: dict[str, float | None] = {}
     for axis, column in zip(_AXES, outside.T, strict=True):
         last = np.flatnonzero(column)
