@@ -87,7 +87,17 @@ def test_new_scenario_flies_well(tmp_path: Path) -> None:
 def test_list_names_everything_registered() -> None:
     done = run("list")
     assert done.returncode == 0
-    for name in ("roismc", "smc", "ismc", "sdre", "paper_model", "luenberger", "effectiveness", "crazyflie-2.1", "ramp"):
+    for name in (
+        "roismc",
+        "smc",
+        "ismc",
+        "sdre",
+        "paper_model",
+        "luenberger",
+        "effectiveness",
+        "crazyflie-2.1",
+        "ramp",
+    ):
         assert f"  {name} " in done.stdout
 
 

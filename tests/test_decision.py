@@ -36,7 +36,6 @@ def arr(values: PerRotor) -> Array:
     return np.array(list(values), dtype=float)
 
 
-
 def decisions(
     losses: list[float], dt: float, start: DecisionMemory | None = None, **settings: float
 ) -> tuple[Array, DecisionMemory]:

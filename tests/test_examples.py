@@ -51,7 +51,9 @@ def test_python_object_is_refused_by_other_engines() -> None:
 
 
 def test_own_controller_cannot_be_repeated_from_a_file(tmp_path: Path) -> None:
-    flight = rf.fly("paper-set-point", example("block_controller", "PdBlock")(), settings={"duration": 0.01}, engine="python")
+    flight = rf.fly(
+        "paper-set-point", example("block_controller", "PdBlock")(), settings={"duration": 0.01}, engine="python"
+    )
     path = flight.save(tmp_path / "own.nc")
     with pytest.raises(rf.InputError, match="PdBlock"):
         rf.repeat(path)

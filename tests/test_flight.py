@@ -64,7 +64,9 @@ def test_csv_has_a_column_per_component(short: rf.Flight, tmp_path: Path) -> Non
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert table.shape == (500, len(header))
     assert {"time", "position_x", "attitude_yaw", "thrust_4", "gain_angle_roll_pitch"} <= set(header)
-    assert table[:, header.index("position_z")] == pytest.approx(short.data["position"].sel(axis="z").values, rel=1e-8)
+    assert table[:, header.index("position_z")] == pytest.approx(
+        short.data["position"].sel(axis="z").values, rel=1e-8
+    )
 
 
 def test_write_leaves_nothing_else_in_the_folder(short: rf.Flight, tmp_path: Path) -> None:

@@ -94,9 +94,7 @@ def test_position_error_dynamics_are_those_designed_for(p: Vec3, v: Vec3, yaw: f
     ].telemetry.attitude_demand
     seen = Measurement(p, v, Vec3(roll, pitch, yaw), zeros())
     output = controller_step(made, VEHICLE, seen, wanted)[2]
-    true = acceleration(
-        VEHICLE, output.wrench.thrust, body_z_axis(seen.attitude), v, Air(zeros(), zeros()), zeros()
-    )
+    true = acceleration(VEHICLE, output.wrench.thrust, body_z_axis(seen.attitude), v, Air(zeros(), zeros()), zeros())
     k1, k2 = position_gains(p, made.parameters(VEHICLE, 1e-3).law)
     u = -k1.times(p) - k2.times(v - wanted.v_W)
     if np.abs(arr(u - output.telemetry.virtual_position_W)).max() < 1e-12:  # not limited
@@ -131,8 +129,9 @@ def test_sdre_without_gyroscopics_is_lqr(weights: Weights) -> None:
     B = np.vstack([np.zeros((6, 6)), np.eye(6)])
     P = solve_continuous_are(A, B, np.diag([*q, *q_rate]), np.diag(r))
     K = np.linalg.solve(np.diag(r), B.T @ P)
-    K_e, K_rate = block_diag(mat(attitude.gain_e), mat(position.gain_e)), block_diag(
-        mat(attitude.gain_rate), mat(position.gain_rate)
+    K_e, K_rate = (
+        block_diag(mat(attitude.gain_e), mat(position.gain_e)),
+        block_diag(mat(attitude.gain_rate), mat(position.gain_rate)),
     )
     np.testing.assert_allclose(np.hstack([K_e, K_rate]), K, rtol=1e-8, atol=1e-8 * np.abs(K).max())
     assert attitude.riccati_residual < 1e-12

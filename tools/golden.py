@@ -1,4 +1,7 @@
-"""Write the golden flights that tests/test_flight.py compares with. Run it only when a change is meant; read the diff."""
+"""Write the golden flights that tests/test_flight.py compares with.
+
+Run it only when a change is meant, and read the difference.
+"""
 
 from pathlib import Path
 

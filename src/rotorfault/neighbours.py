@@ -31,7 +31,8 @@ def neighbour(
     Scenario
         Same parts, same length: it may fly in one batch with the original.
     """
-    draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed])))
+    # The second word keeps this stream apart from the sensor noise of the same seed.
+    draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 1 << 40])))
 
     def factors(count: int) -> list[float]:
         return [float(x) for x in draw.uniform(1.0 - spread, 1.0 + spread, count)]

@@ -25,6 +25,7 @@ from rotorfault.closed_loop import ClosedLoop
 from rotorfault.engine.structure import parts_of, structure
 from rotorfault.files import write_atomically
 
+KEEP = 100  # compiled loops on disk
 _KEPT: dict[str, Any] = {}
 _SUM_LENGTH = hashlib.sha256().digest_size
 
@@ -38,7 +39,7 @@ class Key(NamedTuple):
 
 def key(loop: ClosedLoop, compiler: str) -> Key:
     """Name of the compiled form of a loop."""
-    words = [_package_digest(), compiler, platform.machine(), platform.processor(), *structure(loop)]
+    words = [_package_digest(), compiler, _processor(), *structure(loop)]
     lasting = True
     for part in parts_of(loop):
         if not type(part).__module__.startswith("rotorfault."):
@@ -71,6 +72,13 @@ def _path(name: Key) -> Path | None:
     return Path(folder) / f"{name.digest}.loop"
 
 
+def _prune(folder: Path) -> None:
+    """Keep the newest compiled loops only: every change of the package leaves old ones behind."""
+    old = sorted(folder.glob("*.loop"), key=lambda file: file.stat().st_mtime)[: -KEEP + 1]
+    for file in old:
+        file.unlink(missing_ok=True)
+
+
 def _load(path: Path | None) -> Any:
     if path is None:
         return None
@@ -90,9 +98,20 @@ def _store(path: Path | None, made: Any) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         content = pickle.dumps(made)
         content = hashlib.sha256(content).digest() + content
+        _prune(path.parent)
         write_atomically(path, lambda temporary: temporary.write_bytes(content))
     except OSError:
         return  # a cache that cannot be written costs a second next time, nothing else
+
+
+def _processor() -> str:
+    """What compiled code depends on of the machine: architecture, and the instruction sets where Linux lists them."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    flags = next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    return f"{platform.machine()} {platform.processor()} {flags}"
 
 
 @lru_cache(maxsize=1)
