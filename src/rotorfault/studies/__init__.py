@@ -1,0 +1,1 @@
+"""Studies: many flights for one question."""

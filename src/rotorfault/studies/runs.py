@@ -1,0 +1,145 @@
+"""Flights that a study needs, flown once each and kept.
+
+A `Run` is a scenario with overrides under a name. `Store` flies what is missing and keeps, per run, the summary as
+JSON and, where asked for, the flight as NetCDF. What is kept is found again by a digest of the whole configuration
+and of the program's source, so that a second start flies nothing twice and no stale number survives a change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from rotorfault.errors import InputError
+from rotorfault.files import write_atomically
+from rotorfault.flight import fly, load
+from rotorfault.metrics import finite_or_none
+from rotorfault.scenario import Scenario, load_scenario
+
+# Parts of the package that cannot change a flight's numbers.
+_IDLE = ("report", "studies", "cli.py", "catalogue.py", "progress.py", "tuning")
+
+Measure = Callable[[xr.Dataset], dict[str, Any]]
+
+
+class Run(NamedTuple):
+    """One flight of a study."""
+
+    id: str  # file name and key, such as "set-point-roismc-1ms"
+    scenario: str  # built-in name
+    overrides: tuple[tuple[str, Any], ...] = ()  # dotted keys and values
+    keep: bool = False  # whether the whole flight is kept, or its summary only
+
+    @property
+    def command(self) -> str:
+        """The command that flies it alone."""
+        words = [f"rotorfault fly {self.scenario}"]
+        for key, value in self.overrides:
+            text = value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+            plain = {"controller.kind": "--controller", "controller.preset": "--preset"}.get(key)
+            words.append(f"{plain} {text}" if plain else f"--set '{key}={text}'")
+        return " ".join(words)
+
+
+class Result(NamedTuple):
+    """What came of a run."""
+
+    run: Run
+    summary: dict[str, Any]
+    extra: dict[str, Any]  # what the study measured besides, see `Store`
+    seconds: float  # how long it took to fly
+    path: Path | None  # flight.nc, where it is kept
+
+    def data(self) -> xr.Dataset:
+        """The whole flight; for runs that are kept."""
+        if self.path is None:
+            raise InputError(f"run '{self.run.id}' keeps no flight, only its summary")
+        return load(self.path).data
+
+
+class Store:
+    """Flies runs and keeps their results in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    measure : callable, optional
+        Takes the records of a flight; what it returns is kept beside the summary. Only numbers, texts and lists.
+    label : str
+        Names the version of `measure`: another label measures anew.
+    """
+
+    def __init__(self, folder: Path, measure: Measure | None = None, label: str = "") -> None:
+        self.folder, self._measure, self._label = folder, measure, label
+        self.flown = 0
+        (folder / "flights").mkdir(parents=True, exist_ok=True)
+        (folder / "runs").mkdir(exist_ok=True)
+
+    def get(self, run: Run) -> Result:
+        """The result of a run, flown now if it is not there yet."""
+        scenario = load_scenario(run.scenario, dict(run.overrides))
+        digest = self._digest(run, scenario)
+        kept = self._kept(run, digest)
+        return kept if kept is not None else self._fly(run, scenario, digest)
+
+    def missing(self, runs: Iterable[Run]) -> list[Run]:
+        """Runs that have no result yet."""
+        return [
+            run
+            for run in runs
+            if self._kept(run, self._digest(run, load_scenario(run.scenario, dict(run.overrides)))) is None
+        ]
+
+    def _fly(self, run: Run, scenario: Scenario, digest: str) -> Result:
+        start = time.perf_counter()
+        flight = fly(scenario)
+        if flight.outcome.kind == "interrupted":
+            raise KeyboardInterrupt
+        extra = {} if self._measure is None else finite_or_none(self._measure(flight.data))
+        seconds = time.perf_counter() - start
+        path = self.folder / "flights" / f"{run.id}.nc" if run.keep else None
+        if path is not None:
+            flight.save(path)
+        content = {"digest": digest, "summary": flight.summary(), "extra": extra, "seconds": seconds}
+        text = json.dumps(content, indent=1, allow_nan=False)
+        # After the flight's own file: a record without its flight must not be found.
+        write_atomically(self._record(run), lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        self.flown += 1
+        return Result(run, dict(flight.summary()), extra, seconds, path)
+
+    def _kept(self, run: Run, digest: str) -> Result | None:
+        try:
+            content = json.loads(self._record(run).read_text(encoding="utf-8"))
+            if content["digest"] != digest:
+                return None
+            path = self.folder / "flights" / f"{run.id}.nc" if run.keep else None
+            if path is not None and not path.is_file():
+                return None
+            return Result(run, content["summary"], content["extra"], float(content["seconds"]), path)
+        except (OSError, ValueError, KeyError, TypeError):
+            return None  # missing or damaged: flown anew
+
+    def _record(self, run: Run) -> Path:
+        return self.folder / "runs" / f"{run.id}.json"
+
+    def _digest(self, run: Run, scenario: Scenario) -> str:
+        words = [_source_digest(), self._label, str(run.keep), json.dumps(scenario.as_tables(), sort_keys=True)]
+        return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _source_digest() -> str:
+    """Digest of all source that a flight's numbers depend on."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] not in _IDLE:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
