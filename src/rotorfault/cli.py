@@ -188,6 +188,43 @@ def trim(
     typer.echo(_load("trim").trim_report(vehicle, controller, preset, period).text())
 
 
+@app.command()
+def tune(
+    controller: Annotated[str, typer.Argument(help="Registered controller with a search space: roismc, smc, ...")],
+    generations: Annotated[int, typer.Option(min=1, help="Generations of the search.")] = 100,
+    population: Annotated[int, typer.Option(min=4, help="Candidates per generation.")] = 24,
+    seed: Annotated[int, typer.Option(min=1, help="Seed of the optimiser.")] = 1,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key of all training flights; may be repeated."),
+    ] = None,
+    name: Annotated[str, typer.Option(help="Name of the preset to write.")] = "tuned",
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TOML file to write; printed if not given.")
+    ] = None,
+) -> None:
+    """Search a controller's gains by CMA-ES on training flights; same budget and objective for all.
+
+    Needs the extra 'tune'. Ctrl-C ends the search and gives the best so far.
+
+    Example: rotorfault tune smc --generations 100 --out smc.toml
+    """
+    if importlib.util.find_spec("cma") is None:
+        raise InputError("tuning needs the package cma, which is not installed; install rotorfault[tune]")
+    search = _load("tuning.search")
+    settings = _load("scenario").parse_overrides(assignments or [])
+    if out is not None:
+        _load("files").output_folder(out.parent)
+    with _load("progress").Bar(f"tuning {controller}", generations, "generations") as bar:
+        tuned = search.tune(controller, generations, population, seed, settings, lambda done, _: bar.update(done))
+    text = search.as_toml(tuned, name)
+    if out is None:
+        typer.echo(text)
+    else:
+        _load("files").write_atomically(out, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        typer.echo(f"wrote {out}, objective {tuned.record['objective']:g}")
+
+
 def main() -> None:
     """Entry point: errors of the user in one line with exit code 2, Ctrl-C with 130."""
     try:

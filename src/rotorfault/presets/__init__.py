@@ -38,7 +38,8 @@ def preset(controller: str, settings: dict[str, Any]) -> dict[str, Any]:
     InputError
         If there is no such preset.
     """
-    known = presets(controller)
+    # How a preset was found is for its readers, not a setting.
+    known = {name: {k: v for k, v in table.items() if k != "record"} for name, table in presets(controller).items()}
     name = settings.get("preset", DEFAULT if DEFAULT in known else "none")
     own = {key: value for key, value in settings.items() if key != "preset"}
     if name == "none":

@@ -1,0 +1,1 @@
+"""Tuning: the same optimiser, budget, seeds, objective and training flights for every controller."""

@@ -1,0 +1,137 @@
+"""The search: CMA-ES over training flights, all candidates of a generation in one batch per group.
+
+Source: N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv 1604.00772; the implementation is the package cma.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import cma
+import numpy as np
+
+from rotorfault._version import __version__
+from rotorfault.assembly import assemble_all
+from rotorfault.engine import default_engine, load_engine
+from rotorfault.engine.batch import Array, no_watch
+from rotorfault.errors import InputError
+from rotorfault.scenario import Scenario
+from rotorfault.tuning.space import SPACES, settings_at
+from rotorfault.tuning.training import objective, training_groups
+
+SPREAD = 0.15  # initial standard deviation, as a share of each range
+
+
+class Tuned(NamedTuple):
+    """What a search found, and how."""
+
+    settings: dict[str, Any]  # tables of the controller
+    record: dict[str, Any]  # optimiser, budget, seed, objective
+
+
+def tune(
+    controller: str,
+    generations: int = 100,
+    population: int = 24,
+    seed: int = 1,
+    overrides: dict[str, Any] | None = None,
+    report: Callable[[int, float], None] | None = None,
+) -> Tuned:
+    """Search the gains of a controller.
+
+    Parameters
+    ----------
+    controller : str
+        One of `rotorfault.tuning.space.SPACES`.
+    generations, population : int
+        Budget: their product is the number of candidates.
+    seed : int
+        Of the optimiser; the training flights have seeds of their own.
+    overrides : dict, optional
+        Dotted keys and values for all training flights, such as ``{"vehicle": "hummingbird"}``.
+    report : callable, optional
+        Called with the generations done and the best objective so far.
+
+    Returns
+    -------
+    Tuned
+        After Ctrl-C: the best until then.
+
+    Raises
+    ------
+    InputError
+        If there is no search space for the controller.
+    """
+    if controller not in SPACES:
+        raise InputError(f"controller '{controller}' has no search space; allowed: {', '.join(SPACES)}")
+    space = SPACES[controller]
+    groups = training_groups(controller, overrides or {})
+    low, start, high = (np.log([entry[i] for entry in space]) for i in (1, 2, 3))
+
+    def tables(x: Array) -> dict[str, Any]:
+        point = np.exp(low + np.clip(x, 0.0, 1.0) * (high - low))
+        return settings_at(controller, {entry[0]: float(p) for entry, p in zip(space, point, strict=True)})
+
+    search = cma.CMAEvolutionStrategy(
+        (start - low) / (high - low),
+        SPREAD,
+        {"bounds": [0.0, 1.0], "popsize": population, "seed": seed, "verbose": -9},
+    )
+    done = 0
+    try:
+        while done < generations:
+            points = search.ask()
+            search.tell(points, _evaluate(controller, [tables(x) for x in points], groups))
+            done += 1
+            if report is not None:
+                report(done, float(search.result.fbest))
+    except KeyboardInterrupt:
+        if done == 0:
+            raise
+    record = {
+        "optimiser": f"CMA-ES (cma {cma.__version__})",
+        "generations": done,
+        "population": population,
+        "seed": seed,
+        "flights_per_candidate": sum(map(len, groups)),
+        "objective": round(float(search.result.fbest), 4),
+        "version": __version__,
+        **({"overrides": dict(overrides)} if overrides else {}),
+    }
+    return Tuned(tables(search.result.xbest), record)
+
+
+def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[list[Scenario]]) -> list[float]:
+    """Mean objective of each candidate; the groups count alike."""
+    total = np.zeros(len(candidates))
+    for group in groups:
+        first = group[0]
+        parts = [
+            Scenario.model_validate({**dict(first), "controller": {"kind": controller, "preset": "none", **table}})
+            for table in candidates
+        ]
+        scenarios = [one.model_copy(update={"controller": part.controller}) for part in parts for one in group]
+        recording = load_engine(default_engine(len(scenarios)))(assemble_all(scenarios), no_watch)
+        times = recording.steps * first.period
+        scores = [objective(one, recording.signals[:, :, i], times) for i, one in enumerate(scenarios)]
+        total += np.array(scores).reshape(len(candidates), len(group)).mean(axis=1)
+    return [float(x) for x in total / len(groups)]
+
+
+def as_toml(tuned: Tuned, name: str) -> str:
+    """A preset as TOML text, with the record of how it was found."""
+    return "\n".join(_table({**tuned.settings, "record": tuned.record}, name)).strip() + "\n"
+
+
+def _table(tables: dict[str, Any], prefix: str) -> list[str]:
+    plain = {key: value for key, value in tables.items() if not isinstance(value, dict)}
+    lines = [f"[{prefix}]", *(f"{key} = {_value(value)}" for key, value in plain.items()), ""] if plain else []
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            lines += _table(value, f"{prefix}.{key}")
+    return lines
+
+
+def _value(value: Any) -> str:
+    return f'"{value}"' if isinstance(value, str) else repr(value)

@@ -1,0 +1,100 @@
+"""What a search may change of each controller, and how a point of the search becomes settings.
+
+Every number is searched on a logarithmic scale between two bounds. Attitude weights are searched as the gains that
+they give at rest (k1, k2), which is the same choice in more telling numbers. Weights of the position axes stay as
+the paper prints them; only floor and cap of |e| are searched.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+# Dotted key (below `controller`), lowest, start, highest; searched on a logarithmic scale.
+Space = list[tuple[str, float, float, float]]
+CASCADE: Space = [
+    ("cascade.filter_bandwidth", 8.0, 25.0, 50.0),
+    ("cascade.tilt_max", 0.4, 0.8, 1.1),
+    ("cascade.horizontal_lag", 2.0, 8.0, 30.0),
+    ("cascade.fall_share", 0.05, 0.3, 0.8),
+    ("cascade.thrust_share", 0.8, 0.95, 1.0),
+]
+SPACES: dict[str, Space] = {
+    "roismc": [
+        *CASCADE,
+        ("roll.k1", 40.0, 200.0, 900.0), ("roll.k2", 10.0, 25.0, 60.0),
+        ("yaw.k1", 5.0, 30.0, 300.0), ("yaw.k2", 4.0, 10.0, 40.0),
+        ("cap.xy", 0.1, 0.34, 2.0), ("cap.z", 0.1, 0.3, 2.0), ("floor", 0.03, 0.1, 1.0),
+        ("law.position.gamma_0", 0.2, 1.5, 8.0), ("law.position.layer", 0.05, 0.6, 5.0),
+        ("law.attitude.gamma_0", 10.0, 150.0, 600.0), ("law.attitude.layer", 1.0, 10.0, 60.0),
+    ],
+    "smc": [
+        *CASCADE,
+        ("position.slope", 0.5, 3.0, 10.0), ("position.reaching", 0.5, 3.0, 15.0),
+        ("position.K", 0.1, 1.0, 6.0), ("law.position.layer", 0.05, 0.5, 3.0),
+        ("roll.slope", 3.0, 10.0, 30.0), ("roll.reaching", 3.0, 12.0, 30.0),
+        ("roll.K", 5.0, 60.0, 400.0), ("law.attitude.layer", 0.5, 6.0, 60.0),
+        ("yaw.slope", 1.0, 4.0, 20.0), ("yaw.reaching", 1.0, 5.0, 20.0), ("yaw.K", 1.0, 20.0, 200.0),
+    ],
+    "ismc": [
+        *CASCADE,
+        ("position_gain.error", 1.0, 8.0, 40.0), ("position_gain.rate", 1.0, 4.5, 12.0),
+        ("roll.k1", 40.0, 200.0, 900.0), ("roll.k2", 10.0, 25.0, 60.0),
+        ("yaw.k1", 5.0, 30.0, 300.0), ("yaw.k2", 4.0, 10.0, 40.0),
+        ("law.position.gamma_0", 0.2, 1.5, 8.0), ("law.position.layer", 0.05, 0.6, 5.0),
+        ("law.attitude.gamma_0", 10.0, 150.0, 600.0), ("law.attitude.layer", 1.0, 10.0, 60.0),
+    ],
+    "sdre": [
+        *CASCADE,
+        ("roll.k1", 40.0, 200.0, 900.0), ("roll.k2", 10.0, 25.0, 60.0),
+        ("yaw.k1", 5.0, 30.0, 300.0), ("yaw.k2", 4.0, 10.0, 40.0),
+        ("cap.xy", 0.1, 0.34, 2.0), ("cap.z", 0.1, 0.3, 2.0), ("floor", 0.03, 0.1, 1.0),
+    ],
+}  # fmt: skip
+R_ATTITUDE = 0.0088
+
+
+def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
+    """Controller tables for a point of the search space."""
+    v = {key: float(f"{value:.4g}") for key, value in values.items()}
+    tables: dict[str, Any] = {"cascade": {key.split(".")[1]: x for key, x in v.items() if key.startswith("cascade.")}}
+    law: dict[str, Any] = {}
+
+    def put(key: str, x: Any) -> None:
+        *path, last = key.split(".")
+        here = law
+        for part in path:
+            here = here.setdefault(part, {})
+        here[last] = x
+
+    for key, x in v.items():
+        if key.startswith("law."):
+            put(key.removeprefix("law."), x)
+    if controller in ("roismc", "sdre"):
+        prefix = "weights." if controller == "roismc" else ""
+        put(f"{prefix}error_cap", [v["cap.xy"], v["cap.xy"], v["cap.z"]])
+        put(f"{prefix}error_floor", [v["floor"]] * 3)
+        # Attitude weights from the gains wanted at rest: k1 = sqrt(q/r), k2 = sqrt(q_rate/r + 2 k1).
+        k1 = [v["roll.k1"], v["roll.k1"], v["yaw.k1"]]
+        k2 = [v["roll.k2"], v["roll.k2"], v["yaw.k2"]]
+        put(f"{prefix}attitude_q_angle", [float(f"{R_ATTITUDE * k * k:.4g}") for k in k1])
+        put(
+            f"{prefix}attitude_q_rate",
+            [float(f"{R_ATTITUDE * max(b * b - 2 * a, 0.0):.4g}") for a, b in zip(k1, k2, strict=True)],
+        )
+    if controller == "ismc":
+        law["position_gain"] = {"error": [v["position_gain.error"]] * 3, "rate": [v["position_gain.rate"]] * 3}
+        law["attitude_gain"] = {
+            "error": [v["roll.k1"], v["roll.k1"], v["yaw.k1"]],
+            "rate": [v["roll.k2"], v["roll.k2"], v["yaw.k2"]],
+        }
+    if controller in ("roismc", "ismc"):
+        paper = controller == "ismc"
+        law["position"]["weight"] = [0.121, 0.765, 0.876] if paper else [0.0349, 0.0423, 0.0265]
+        law["position"]["k"] = [0.164, 0.665, 0.0212] if paper else [0.01] * 3
+        law["attitude"]["weight"] = [-0.614, -0.751, -0.232] if paper else [0.0234, 0.087, 0.0766]
+        law["attitude"]["k"] = [0.0112, 0.0156, 0.876] if paper else [0.1] * 3
+    if controller == "smc":
+        law["position"].update({key: [v[f"position.{key}"]] * 3 for key in ("slope", "reaching", "K")})
+        for key in ("slope", "reaching", "K"):
+            law["attitude"][key] = [v[f"roll.{key}"]] * 2 + [v[f"yaw.{key}"]]
+    return {**tables, "law": law}

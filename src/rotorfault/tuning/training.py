@@ -1,0 +1,124 @@
+"""The flights that gains are searched on, and what a flight is worth.
+
+Training flights are neighbours of the paper's cases, never the cases themselves: true mass, inertia, drag, rotor lag
+and initial state differ by up to 10 % (25 % for the lag), unknown to the autopilot, and the faults set in at another
+time. Case 1 is trained on both plants; case 3 with shorter periods, to see more switches in less time.
+
+Objective of a flight, the smaller the better:
+
+- set point: time to settle within 2 % of the step (0.6 of the onset plus the time from then on, where the fault
+  interrupts), plus the largest excursion after the fault beyond 0.7 of the band;
+- moving reference: 10 (sinusoid) or 2 (square wave) times the root mean square position error in m;
+- plus 0.3 log10(1 + J) with the paper's cost J, 1 for every false alarm or missed rotor, the tilt beyond 1.1 rad,
+  and 0.04 log10(1 + mean square of the demanded angular acceleration);
+- 10 for a flight that is lost.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from rotorfault.engine.batch import Array
+from rotorfault.metrics import cost, first_loss
+from rotorfault.neighbours import neighbour
+from rotorfault.scenario import Scenario, load_scenario
+from rotorfault.telemetry import SIGNAL_NAMES, quantities
+
+LOST = 10.0
+BAND = 0.02
+FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
+_FAULTY = np.array([1.0, 0.0, 1.0, 0.0])
+_TRACKING = {"paper-sinusoid": 10.0, "paper-square": 2.0}
+
+# Scenario, overrides, number of neighbours; one batch each.
+GROUPS: tuple[tuple[str, dict[str, Any], int], ...] = (
+    ("paper-set-point", {"duration": 6.0}, 7),
+    ("paper-set-point", {"duration": 6.0, "plant": "rigid_body"}, 7),
+    ("paper-sinusoid", {"duration": 10.0}, 4),
+    ("paper-square", {"duration": 22.0, "reference.period": [16.0, 18.0, 20.0], "reference.yaw_period": 17.0}, 4),
+)
+
+
+def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Scenario]]:
+    """Training flights in groups that fly in one batch each.
+
+    Parameters
+    ----------
+    controller : str
+    overrides : dict
+        Dotted keys and values for all flights, such as another vehicle.
+    """
+    draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([FIRST_SEED])))
+    groups = []
+    for name, own, count in GROUPS:
+        settings = {"controller.kind": controller, "record_period": 0.01, **own, **overrides}
+        base = load_scenario(name, settings)
+        group = []
+        for i in range(count):
+            one = neighbour(base, seed=FIRST_SEED + i)
+            lag = float(draw.uniform(0.75, 1.25))
+            group.append(
+                one.model_copy(update={"mismatch": one.mismatch.model_copy(update={"rotor_bandwidth": lag})})
+            )
+        groups.append(group)
+    return groups
+
+
+def objective(scenario: Scenario, signals: Array, times: Array) -> float:
+    """What one flight is worth.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    signals : ndarray, shape (records, rows of `Signals`)
+    times : ndarray, shape (records,)
+        In s.
+    """
+    if first_loss(signals, None) is not None:
+        return LOST
+    data = columns(signals, times)
+    flags = data["fault_flag"].values
+    onset = float(scenario.fault[0].settings.time)
+    k = int(np.searchsorted(times, onset - 1e-9))
+    tracking = _TRACKING.get(scenario.name)
+    error = data["position"].values - data["position_reference"].values
+    worth = _settling(error, times, onset, k) if tracking is None else tracking * float(np.sqrt(np.mean(error**2)))
+    wrong = np.abs(flags[-1] - _FAULTY).sum() + flags[:k].max(axis=0, initial=0.0).sum()
+    wrong += flags[k:, [1, 3]].max(axis=0, initial=0.0).sum()
+    attitude, virtual = data["attitude"].values, data["virtual_attitude"].values
+    tilt = float(np.arccos(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1])).max())
+    return (
+        worth
+        + float(wrong)
+        + 0.3 * math.log10(1.0 + cost(data))
+        + max(0.0, tilt - 1.1)
+        + 0.04 * math.log10(1.0 + float(np.mean(virtual**2)))
+    )
+
+
+def _settling(error: Array, times: Array, onset: float, k: int) -> float:
+    excess = np.max(np.abs(error) / (BAND * np.abs(error[0])), axis=1)
+    every = float(times[1] - times[0])
+    before, after = np.flatnonzero(excess[:k] > 1.0), np.flatnonzero(excess[k:] > 1.0)
+    first = (before[-1] + 1) * every if len(before) else 0.0
+    late = (after[-1] + 1) * every if len(after) else 0.0
+    left = 0.3 * float(excess[-1])
+    if first < onset - every:
+        return float(first + late + max(0.0, float(excess[k:].max()) - 0.7) + left)
+    return float(0.6 * onset + late + left)
+
+
+def columns(signals: Array, times: Array) -> Any:
+    """Records by name, in the shape that `rotorfault.metrics` reads them, without the cost of a dataset."""
+    found: dict[str, Any] = {"time": SimpleNamespace(values=times)}
+    row = 0
+    for name in quantities():
+        width = sum(1 for full in SIGNAL_NAMES if full.partition(".")[0] == name)
+        block = signals[:, row : row + width]
+        found[name] = SimpleNamespace(values=block if width > 1 else block[:, 0])
+        row += width
+    return found
