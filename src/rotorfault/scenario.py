@@ -264,7 +264,8 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
 def override(tables: dict[str, Any], key: str, value: Any) -> None:
     """Set a dotted key in tables, in place.
 
-    Numbers in the key index lists (``fault.0.loss``). Setting ``kind``, or a table that has one to a bare name,
+    Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
+    below it is set (``vehicle.rotor_bandwidth.value``). Setting ``kind``, or a table that has one to a bare name,
     drops the other settings of that table: they belonged to another kind.
 
     Raises
@@ -279,6 +280,9 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             here = here[_index(here, part, key)]
         elif isinstance(here, dict):
             inner = here.get(part)
+            if here is tables and part == "vehicle" and isinstance(inner, str):
+                # A vehicle's name stands for its file: laid out here, so that single numbers of it can be set.
+                inner = here[part] = load_vehicle(inner).model_dump(mode="json")
             if (isinstance(inner, str) and depth == len(path) - 1) or inner is None:
                 # A bare name stands for a table with that kind.
                 inner = here[part] = {} if inner is None else {"kind": inner}
