@@ -5,7 +5,6 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check
 NUMPY_PIP := .venv-numpy/bin/python -m pip --disable-pip-version-check
 # Two test processes on two cores: more threads in BLAS only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
-CASE := results/paper-set-point
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -41,10 +40,8 @@ check-python:
 
 venv: .venv/.stamp-develop ## Create .venv with rotorfault, the tests' and the developers' tools
 
-paper: .venv/.stamp-fly ## Fly the paper's set-point case under SMC and ROISMC and compare them
-	.venv/bin/rotorfault fly paper-set-point --controller smc --out $(CASE)/smc
-	.venv/bin/rotorfault fly paper-set-point --controller roismc --out $(CASE)/roismc
-	.venv/bin/rotorfault compare $(CASE)/smc/flight.nc $(CASE)/roismc/flight.nc --out $(CASE)/compare
+paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and claim
+	.venv/bin/rotorfault paper --out results/paper
 
 test: .venv/.stamp-develop ## Run the tests
 	.venv/bin/python -m pytest -n 2

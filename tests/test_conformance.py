@@ -41,6 +41,7 @@ KEYS = {
     "sensors": "sensors",
     "diagnoses": "diagnosis",
     "allocators": "allocation",
+    "responses": "on_fault",
 }
 PARTS = [(group, name) for group, registry in REGISTRIES.items() for name in registry]
 each_part = pytest.mark.parametrize(("group", "name"), PARTS, ids=[f"{group}-{name}" for group, name in PARTS])
@@ -111,6 +112,7 @@ def scenario(folder: Path, **parts: str) -> Scenario:
         "start": {"position": [0.1, -0.1, 0.2], "attitude": [0.1, -0.2, 0.3], "velocity": [0.1, 0.2, 0.0]},
         "reference": {"kind": "set_point", "position": [0.2, 0.1, 0.3]},
     }
+    base |= {"ground": -5.0} if parts.get("responses") == "land" else {}
     tables = base | {KEYS[group]: table(group, name, folder) for group, name in parts.items()}
     return scenario_from(tables, "test")
 

@@ -36,6 +36,7 @@ PAGE_OF = {
     "sensors": "scenarios.md",
     "diagnoses": "diagnosis.md",
     "allocators": "allocation.md",
+    "responses": "scenarios.md",
 }
 TOP = ("src", "docs", "tests", "tools", "examples", "benchmarks")
 
@@ -156,7 +157,7 @@ def test_summary_and_outcomes_are_defined() -> None:
     assert summary["detections"]
     for key in [*summary, *summary["detections"][0]]:
         assert f"`{key}`" in text, key
-    for outcome in ("settled", "tracked", "offset", "ground", "tumbled", "diverged", "interrupted"):
+    for outcome in ("settled", "tracked", "offset", "landed", "ground", "tumbled", "diverged", "interrupted"):
         assert f"| `{outcome}` |" in text
 
 

@@ -263,8 +263,8 @@ def test_without_heyoka_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch)
 class Compiler:
     """Counts compilations; the compiled thing itself is small, whatever the loop."""
 
-    def __init__(self, simd: Any) -> None:
-        self.count, self._simd, self._right = 0, simd, simd._compile
+    def __init__(self, module: Any) -> None:
+        self.count, self._right = 0, module._compile_whole
 
     def __call__(self, batch: Batch) -> Any:
         self.count += 1
@@ -274,10 +274,10 @@ class Compiler:
 @pytest.fixture
 def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Compiler:
     pytest.importorskip("heyoka")
-    from rotorfault.engine import simd
+    from rotorfault.engine import compiled
 
-    found = Compiler(simd)
-    monkeypatch.setattr(simd, "_compile", found)
+    found = Compiler(compiled)
+    monkeypatch.setattr(compiled, "_compile_whole", found)
     monkeypatch.setattr(cache, "_KEPT", {})
     monkeypatch.setenv("ROTORFAULT_CACHE", str(tmp_path / "cache"))
     return found
@@ -300,12 +300,12 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
 
     # Really another process: its compiler must not be asked.
     code = (
-        "from rotorfault.engine import simd, load_engine\n"
+        "from rotorfault.engine import compiled, load_engine\n"
         "from rotorfault.assembly import assemble\n"
         "from rotorfault.engine.batch import no_watch\n"
         "from rotorfault.scenario import scenario_from\n"
         "def refuse(batch): raise SystemExit('compiled again')\n"
-        "simd._compile = refuse\n"
+        "compiled._compile_whole = refuse\n"
         f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
         "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
     )
@@ -377,3 +377,14 @@ def test_structure_is_one_word_per_part() -> None:
     words = structure(assemble(short()).loop)
     assert all(isinstance(word, str) for word in words)
     assert "RigidBody" in words[0]
+
+
+@pytest.mark.parametrize("period", [0.003, 0.01])
+def test_many_integration_steps_in_a_period_agree_too(period: float) -> None:
+    """The engine then compiles the sampling instant and the integration step apart."""
+    pytest.importorskip("heyoka")
+    settings = {"duration": 2.4, "period": period, "diagnosis.poles": [60.0, 80.0]}
+    python = rotorfault.fly("paper-set-point", settings=settings, engine="python")
+    simd = rotorfault.fly("paper-set-point", settings=settings, engine="simd")
+    assert np.abs(python.data["position"] - simd.data["position"]).max() < 1e-9
+    assert np.abs(python.data["thrust"] - simd.data["thrust"]).max() < 1e-8

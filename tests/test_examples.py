@@ -65,6 +65,15 @@ def test_what_is_no_controller_is_refused(given: object) -> None:
         rf.fly("paper-set-point", given, settings=SHORT)
 
 
+def test_an_update_that_fails_is_told() -> None:
+    class Divides:
+        def update(self, time: float, *_: object) -> float:
+            return 1.0 / time
+
+    with pytest.raises(rf.InputError, match=r"Divides\.update at t = 0 s: ZeroDivisionError"):
+        rf.fly("paper-set-point", Divides(), settings=SHORT)
+
+
 def test_an_update_that_returns_nonsense_is_told() -> None:
     class Wrong:
         def update(self, *_: object) -> float:

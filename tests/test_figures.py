@@ -2,65 +2,29 @@
 
 from __future__ import annotations
 
-import re
-import warnings
-from itertools import combinations
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-import xarray as xr
+from figure_checks import (
+    ONSET,
+    THRESHOLD,
+    check_nothing_covered,
+    check_units,
+    crashed,
+    legend_labels,
+    lines_of,
+    made_up,
+)
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
-from rotorfault.dataset import dataset
 from rotorfault.errors import InputError
 from rotorfault.report import figures, panels, style
-from rotorfault.telemetry import SIGNAL_NAMES
 
 NAMES = {"position", "attitude", "rotor_speeds", "path", "fault_detection", "control", "control_detail"}
-ONSET, THRESHOLD = 1.8, 0.12
-UNIT = re.compile(r"\(.+\)$")
-
-
-def made_up(
-    seed: int = 0, duration: float = 20.0, onset: float = ONSET, drift: float = 0.0, **attributes: object
-) -> xr.Dataset:
-    """A flight to (2, 2, 2) in which rotors 1 and 3 fail; its signals are smooth with noise on top."""
-    time = np.arange(round(duration / 0.01)) * 0.01
-    random = np.random.default_rng(seed)
-    signals = 0.01 * random.standard_normal((len(time), len(SIGNAL_NAMES)))
-
-    def put(name: str, values: object) -> None:
-        signals[:, SIGNAL_NAMES.index(name)] = values
-
-    for axis in "xyz":
-        put(f"position.{axis}", 2.0 - 2.0 * np.exp(-time) + drift * time**2)
-        put(f"position_reference.{axis}", 2.0)
-    for rotor, loss in enumerate((0.25, 0.0, 0.35, 0.0), start=1):
-        put(f"loss_true.r{rotor}", loss * (time >= onset))
-        put(f"loss_estimated.r{rotor}", loss * (1.0 - np.exp(-np.maximum(time - onset, 0.0) / 0.02)))
-        put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
-        put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
-    put("lyapunov", np.exp(-time) + 1e-6)
-    given_too = {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
-    return dataset(signals, time, given_too | attributes)
-
-
-def crashed(at: float = 6.0) -> xr.Dataset:
-    """A flight whose numbers explode before `at` and are NaN from there on, except for what comes from outside."""
-    data = made_up(seed=1, outcome="diverged", end_time=at)
-    time = data["time"].values
-    blow = 1e-3 * np.exp(np.minimum(np.maximum(time - at + 0.1, 0.0) * 300.0, 40.0))
-    for name in data.data_vars:
-        if name not in ("loss_true", "position_reference"):
-            data[name] = data[name] + xr.DataArray(np.where(time < at, blow, np.nan), dims="time")
-    return data
 
 
 @pytest.fixture(scope="module")
@@ -84,35 +48,6 @@ def drawn(request: pytest.FixtureRequest) -> dict[str, Figure]:
     return found
 
 
-def texts(figure: Figure) -> list[tuple[str, Bbox]]:
-    """Labels, titles, notes, offsets, tick labels and the legend as they are laid out."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # a layout that was not found
-        figure.draw_without_rendering()
-    found = [(f"legend of {figure}", legend.get_window_extent()) for legend in figure.legends]
-    for axes in figure.axes:
-        parts: list[Text] = [*axes.texts, axes.title]
-        flat = axes.name != "3d"
-        for one_axis in (axes.xaxis, axes.yaxis) if flat else (axes.xaxis, axes.yaxis, axes.zaxis):
-            parts += [one_axis.label, one_axis.get_offset_text()]
-            if flat:
-                low, high = sorted(one_axis.get_view_interval())
-                slack = 0.0 if one_axis.get_scale() == "log" else 1e-6 * (high - low)
-                low, high = low - slack, high + slack
-                parts += [tick.label1 for tick in one_axis.get_major_ticks() if low <= tick.get_loc() <= high]
-        shown = (part for part in parts if part.get_visible() and part.get_text())
-        found += [(part.get_text(), part.get_window_extent()) for part in shown]
-    return found
-
-
-def legend_labels(figure: Figure) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-
-
-def lines_of(axes: Axes, colour: str) -> list[np.ndarray]:
-    return [np.asarray(line.get_xydata()) for line in axes.lines if line.get_color() == colour]
-
-
 def test_all_figures_have_thesis_width(one: dict[str, Figure]) -> None:
     assert set(one) == NAMES
     assert all(figure.get_figwidth() * 2.54 == pytest.approx(16.0) for figure in one.values())
@@ -120,39 +55,21 @@ def test_all_figures_have_thesis_width(one: dict[str, Figure]) -> None:
 
 def test_every_axis_carries_its_unit(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
-        for axes in figure.axes:
-            if axes.name == "3d":
-                assert [axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()] == ["x (m)", "y (m)", "z (m)"]
-                continue
-            place = axes.get_subplotspec()
-            assert (axes.get_xlabel() == "time (s)") == place.is_last_row(), name
-            # A detail stands beside a panel of the same quantity, which has the label.
-            beside = [other for other in figure.axes if other.get_subplotspec().rowspan == place.rowspan]
-            before = [o.get_ylabel() for o in beside if o.get_subplotspec().colspan.start <= place.colspan.start]
-            assert any(before), name
-            assert all(UNIT.search(label) for label in before if label), before
+        check_units(name, figure)
+        flat = [axes for axes in figure.axes if axes.name != "3d"]
+        assert {axes.get_xlabel() for axes in flat} <= {"", "time (s)"}, name
 
 
 def test_nothing_covers_anything_else(drawn: dict[str, Figure]) -> None:
     for name, figure in drawn.items():
-        found = texts(figure)
-        page = figure.bbox.padded(1.0)
-        assert len(found) >= 4
-        for text, box in found:
-            inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
-            assert inside, f"{name}: {text!r} leaves the page: {box}"
-        for (text, box), (other, there) in combinations(found, 2):
-            # A touch of a point is none: boxes are wider than their letters.
-            shared = Bbox.intersection(box, there)
-            covered = shared is not None and min(shared.width, shared.height) > 2.0
-            assert not covered, f"{name}: {text!r} and {other!r} overlap"
+        check_nothing_covered(name, figure)
 
 
 def test_the_overlap_check_would_notice(one: dict[str, Figure]) -> None:
     figure = figures.draw(made_up())["position"]
     figure.axes[0].set_title("a title that is much too long for a panel and runs into the one beside it")
     with pytest.raises(AssertionError, match=r"overlap|leaves"):
-        test_nothing_covers_anything_else({"position": figure})
+        check_nothing_covered("position", figure)
 
 
 def test_drawn_data_are_finite_and_complete(one: dict[str, Figure]) -> None:
@@ -213,7 +130,7 @@ def test_long_and_odd_labels_are_shown() -> None:
     drawn = figures.draw({label: made_up(duration=3.0) for label in labels})["position"]
     shown = legend_labels(drawn)[:4]
     assert [text.strip("\u200b")[:8] for text in shown] == ["_private", "cost in ", "xxxxxxxx", "flight"]
-    test_nothing_covers_anything_else({"position": drawn})
+    check_nothing_covered("position", drawn)
 
 
 def test_a_crash_ends_the_curve_and_does_not_set_the_scale(lost: dict[str, Figure]) -> None:

@@ -75,6 +75,31 @@ def test_write_leaves_nothing_else_in_the_folder(short: rf.Flight, tmp_path: Pat
     assert json.loads(written[1].read_text())["seed"] == 0
 
 
+def climbing(time: float) -> tuple[float, float, float, float]:
+    return 0.0, 0.0, 1.0 + 0.1 * time, 0.0
+
+
+def test_a_python_function_is_a_reference(tmp_path: Path) -> None:
+    settings = {"duration": 0.1, "reference": {"kind": "function", "function": climbing}}
+    flight = rf.fly("paper-set-point", settings=settings)
+    assert flight.data["position_reference"].values[-1, 2] == pytest.approx(1.0099)
+    path = flight.save(tmp_path / "flight.nc")
+    stored = json.loads(rf.load(path).data.attrs["configuration"])["reference"]["function"]
+    assert stored.endswith(":climbing")
+
+
+@pytest.mark.parametrize("given", [5, None, ["paper-set-point"]])
+def test_what_is_no_scenario_is_refused(given: object) -> None:
+    with pytest.raises(rf.InputError, match="allowed: a name, a path"):
+        rf.fly(given)
+
+
+def test_a_reference_that_is_not_finite_is_refused() -> None:
+    huge = {"kind": "sinusoid", "amplitude": [1.0, 1.0, 1.0], "frequency": [1e300, 1.0, 1.0]}
+    with pytest.raises(rf.InputError, match=r"reference: .* is not finite"):
+        rf.fly("paper-set-point", settings={**SHORT, "reference": huge})
+
+
 def test_noise_depends_on_the_seed_and_on_nothing_else() -> None:
     noisy = {**SHORT, "sensors.kind": "noisy"}
     one, same = (rf.fly("paper-set-point", settings=noisy, seed=7) for _ in range(2))

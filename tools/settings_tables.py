@@ -169,7 +169,7 @@ def _settings_table(rows: list[Setting]) -> str:
 
 
 def _scenario() -> Iterator[Setting]:
-    parts = {"reference", "wind", "fault", "sensors", "controller", "diagnosis", "allocation"}
+    parts = {"reference", "wind", "fault", "sensors", "controller", "diagnosis", "allocation", "on_fault"}
     inside = {"start": Start, "mismatch": Mismatch}
     for name, field in Scenario.model_fields.items():
         if name in inside:

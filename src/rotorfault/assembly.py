@@ -13,7 +13,7 @@ from rotorfault.engine.batch import Array, Batch, Noise
 from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
-from rotorfault.plant import PLANTS, Normals, no_noise
+from rotorfault.plant import PLANTS, Ground, Normals, no_noise
 from rotorfault.plant.plant import Plant
 from rotorfault.records import flatten, unflatten
 from rotorfault.reference import ReferenceTable
@@ -29,6 +29,11 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
     scenario : Scenario
     controller : Controller, optional
         Flies in place of the scenario's.
+
+    Raises
+    ------
+    InputError
+        If the reference is not finite, or a part cannot be made for this vehicle and sampling period.
     """
     vehicle = scenario.vehicle.vehicle
     plant = Plant(
@@ -36,12 +41,14 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
         scenario.wind.make(),
         [fault.make() for fault in scenario.fault],
         scenario.substeps,
+        None if scenario.ground is None else Ground(scenario.ground),
     )
     sensors = scenario.sensors.make()
     autopilot = Autopilot(
         scenario.diagnosis.make(),
         scenario.controller.make() if controller is None else controller,
         scenario.allocation.make(),
+        scenario.on_fault.make(),
     )
     loop = ClosedLoop(plant, sensors, autopilot)
     parameters = LoopParameters(
@@ -51,12 +58,20 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
         period=scenario.period,
     )
     times = np.arange(scenario.steps) * scenario.period
-    table = scenario.reference.make().table(times)
+    with np.errstate(all="ignore"):
+        table = scenario.reference.make().table(times)
+    rows = reference_rows(table)
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(wrong):
+        raise InputError(
+            f"reference: position, velocity or acceleration at t = {times[wrong[0]]:g} s is not finite; "
+            "its numbers are too large, or its times too short"
+        )
     seeds = ((scenario.seed, 0),)
     start = Start(*(Vec3.of(part) for part in _start(scenario)))
     drive = Drive(_first(table), _first_noise(seeds) if sensors.needs_noise else no_noise())
     state = loop.initial(start, drive, parameters)
-    return Batch(loop, state, parameters, reference_rows(table), 1, seeds, scenario.every)
+    return Batch(loop, state, parameters, rows, 1, seeds, scenario.every)
 
 
 def assemble_all(scenarios: Sequence[Scenario]) -> Batch:

@@ -1,4 +1,4 @@
-"""The autopilot: diagnosis, then control, then allocation, once per sampling period.
+"""The autopilot: diagnosis, response to a fault, control, allocation, once per sampling period.
 
 It sees measurements and the scenario's reference, and holds beliefs: about its vehicle, about what its rotors do
 with the commands it sent, about faults. It never sees the plant.
@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, final
 
 from rotorfault.allocation.attainable import thrust_available
 from rotorfault.allocation.protocol import Allocator
+from rotorfault.control.landing import Continue, Response, ResponseInputs
 from rotorfault.control.protocol import ControlInputs, Controller, ControlTelemetry, Prediction
 from rotorfault.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.diagnosis.rotor_model import RotorModel, expected_thrust, follow, rotors_at_hover
@@ -24,6 +25,7 @@ class AutopilotParameters(NamedTuple):
 
     vehicle: Vehicle
     diagnosis: Any
+    response: Any
     control: Any
 
 
@@ -35,6 +37,7 @@ class AutopilotMemory(NamedTuple):
     direct_acceleration_W: Vec3  # m/s^2: commanded last, zero without the option `six_inputs`
     elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
     diagnosis: Any
+    response: Any
     control: Any
 
 
@@ -46,26 +49,36 @@ class AutopilotReport(NamedTuple):
     wrench: Wrench  # demanded
     allocation: Allocation
     control: ControlTelemetry
+    reference: Reference  # that was flown
+    stage: Scalar  # of the response: 0 as the scenario wants, 1 descending, 2 rotors stopped
 
 
 @final
 class Autopilot:
-    """Diagnosis, control and allocation put together.
+    """Diagnosis, response to a fault, control and allocation put together.
 
     Parameters
     ----------
     diagnoser : Diagnoser
     controller : Controller
     allocator : Allocator
+    response : Response, optional
+        What it does about a confirmed fault; flies on if not given.
     """
 
-    def __init__(self, diagnoser: Diagnoser, controller: Controller, allocator: Allocator) -> None:
+    def __init__(
+        self, diagnoser: Diagnoser, controller: Controller, allocator: Allocator, response: Response | None = None
+    ) -> None:
         self.diagnoser, self.controller, self.allocator = diagnoser, controller, allocator
+        self.response: Response = Continue() if response is None else response
 
     def parameters(self, vehicle: Vehicle, period: float) -> AutopilotParameters:
         """Numbers for a believed vehicle and a sampling period in s."""
         return AutopilotParameters(
-            vehicle, self.diagnoser.parameters(vehicle, period), self.controller.parameters(vehicle, period)
+            vehicle,
+            self.diagnoser.parameters(vehicle, period),
+            self.response.parameters(),
+            self.controller.parameters(vehicle, period),
         )
 
     def initial(
@@ -78,6 +91,7 @@ class Autopilot:
             direct_acceleration_W=zeros(),
             elapsed=0.0,
             diagnosis=self.diagnoser.initial(measurement, parameters.diagnosis),
+            response=self.response.initial(measurement),
             control=self.controller.initial(measurement, reference, parameters.control),
         )
 
@@ -117,7 +131,22 @@ class Autopilot:
             ),
             parameters.diagnosis,
         )
+        diagnosis = self.response.believed(memory.response, diagnosis)
         prediction = predict(memory, measurement, diagnosis, vehicle, speed)
+        response_memory, decided = self.response.step(
+            memory.response,
+            ResponseInputs(
+                measurement,
+                reference,
+                vehicle,
+                diagnosis,
+                thrust_now.dot(1.0 - diagnosis.loss),
+                measurement.v_W.z - memory.previous.v_W.z - prediction.delta_v_W.z,
+            ),
+            parameters.response,
+            dt,
+        )
+        reference = decided.reference
         control_memory, demanded = self.controller.step(
             memory.control,
             ControlInputs(
@@ -127,17 +156,21 @@ class Autopilot:
             dt,
         )
         allocation = self.allocator.allocate(vehicle, demanded.wrench, diagnosis)
+        thrust = self.response.relieved(allocation.command, decided, vehicle)
 
         after = AutopilotMemory(
-            rotors=follow(memory.rotors, allocation.command, vehicle, dt),
+            rotors=follow(memory.rotors, thrust, vehicle, dt),
             previous=measurement,
             direct_acceleration_W=demanded.direct_acceleration_W,
             elapsed=dt,
             diagnosis=diagnosis_memory,
+            response=response_memory,
             control=control_memory,
         )
-        command = Command(allocation.command, demanded.direct_acceleration_W)
-        report = AutopilotReport(diagnosis, thrust_now, demanded.wrench, allocation, demanded.telemetry)
+        command = Command(thrust, demanded.direct_acceleration_W)
+        report = AutopilotReport(
+            diagnosis, thrust_now, demanded.wrench, allocation, demanded.telemetry, reference, decided.stage
+        )
         return after, command, report
 
 

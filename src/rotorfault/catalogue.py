@@ -10,7 +10,7 @@ from typing import Any
 from rotorfault import dataset
 from rotorfault.allocation import ALLOCATORS
 from rotorfault.config import parse_toml, read_text
-from rotorfault.control import CONTROLLERS
+from rotorfault.control import CONTROLLERS, RESPONSES
 from rotorfault.diagnosis import DIAGNOSES
 from rotorfault.engine import ENGINES
 from rotorfault.errors import InputError
@@ -31,6 +31,7 @@ REGISTRIES: dict[str, Registry[Any]] = {
     "sensors": SENSORS,
     "diagnoses": DIAGNOSES,
     "allocators": ALLOCATORS,
+    "responses": RESPONSES,
 }
 
 
@@ -85,8 +86,9 @@ def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
     makers = {"vehicle": new_vehicle, "scenario": new_scenario}
     if what not in makers:
         raise InputError(unknown("kind of file", what, list(makers)))
-    if "/" in name or "\\" in name or name in (".", ".."):
-        raise InputError(f"name '{name}'; allowed: a plain name without folders; give the folder with --out")
+    name = name.removesuffix(".toml")
+    if "/" in name or "\\" in name or name in (".", "..") or len(name.encode()) > 200:
+        raise InputError(f"name '{name}'; allowed: a plain, short name without folders; give the folder with --out")
     content = makers[what](name)
     path = output_folder(folder) / f"{name}.toml"
     if path.exists() and not force:
@@ -107,9 +109,10 @@ def check(path: Path) -> str:
         data = dataset.read_netcdf(path)
         scenario = scenario_from(dataset.configuration(data, path), str(path))
         return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
-    tables = parse_toml(read_text(path), str(path))
+    text = read_text(path)
     if path.suffix != ".toml":
         raise InputError(f"{path}: ends in '{path.suffix}'; allowed: .toml (vehicle, scenario) or .nc (flight)")
+    tables = parse_toml(text, str(path))
     # A vehicle has rotors and a mass, a scenario a reference and a duration; a bad file may lack some of either.
     if {"mass", "rotor", "inertia_x", "thrust_max"} & set(tables):
         vehicle = load_vehicle(path)

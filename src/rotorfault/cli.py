@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -89,12 +90,17 @@ def fly(
     own = _own_controller(controller) if controller is not None and ".py:" in controller else controller
     checked = flight.prepare(scenario, own if isinstance(own, str) else None, settings, seed)
     label = checked.controller.kind if own is None or isinstance(own, str) else type(own).__name__
-    folder = out or Path("results") / f"{checked.name}-{label}"
+    folder = out or Path("results") / f"{checked.name}-{label}".replace("/", "_")
     _load("files").output_folder(folder)
     if own is None or isinstance(own, str):
         for warning in _load("trim").sampled_data_warnings(checked):
             typer.echo(f"warning: {warning}", err=True)
-    _finish(flight.fly(checked, None if isinstance(own, str) else own, engine=engine), folder, figures)
+    for number, fault in enumerate(checked.fault):
+        onset = getattr(fault.settings, "time", getattr(fault.settings, "start", 0.0))
+        if onset >= checked.duration:
+            text = f"fault.{number} sets in at {onset:g} s, after the end of the flight at {checked.duration:g} s"
+            typer.echo(f"warning: {text}", err=True)
+    _finish(_flown(checked, own, controller, engine), folder, figures)
 
 
 def _finish(flight: Any, folder: Path, figures: bool) -> None:
@@ -118,11 +124,36 @@ def _own_controller(place: str) -> Any:
     sys.modules[path.stem] = module
     try:
         spec.loader.exec_module(module)
+        if not hasattr(module, name):
+            raise InputError(f"--controller {place}: {path} has no class '{name}'")
         return getattr(module, name)()
-    except AttributeError:
-        raise InputError(f"--controller {place}: {path} has no class '{name}'") from None
+    except InputError:
+        raise
     except Exception as error:
-        raise InputError(f"--controller {place}: {type(error).__name__}: {' '.join(str(error).split())}") from None
+        raise InputError(f"--controller {place}: {_told(error)}") from None
+
+
+def _told(error: Exception) -> str:
+    """An exception in a user's code in one line, with its place."""
+    text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    frames = traceback.extract_tb(error.__traceback__)
+    if isinstance(error, SyntaxError) or not frames:
+        return text
+    return f"{text} ({frames[-1].filename}, line {frames[-1].lineno})"
+
+
+def _flown(checked: Any, own: Any, place: str | None, engine: str | None) -> Any:
+    """Fly; whatever goes wrong in a user's own controller is told in one line."""
+    flight = _load("flight")
+    if own is None or isinstance(own, str):
+        return flight.fly(checked, engine=engine)
+    try:
+        return flight.fly(checked, own, engine=engine)
+    except InputError:
+        raise
+    except Exception as error:
+        hint = "" if hasattr(own, "update") else "; a block keeps to the scalar style of docs/own-controller.md"
+        raise InputError(f"--controller {place}: {_told(error)}{hint}") from error
 
 
 @app.command()
@@ -189,6 +220,31 @@ def trim(
 
 
 @app.command()
+def paper(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for everything.")] = Path("results/paper"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out ablation and sensitivity.")] = False,
+    case: Annotated[str | None, typer.Option(help="Fly this case alone: set-point, sinusoid or square.")] = None,
+    controller: Annotated[str | None, typer.Option(help="Fly this controller alone: smc or roismc.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if not given.")] = None,
+) -> None:
+    """Reproduce the paper: every case, figure, table and claim, with a verdict on each claim.
+
+    Writes report.html, claims.json, table1.csv, ablation.csv, sensitivity.csv, figures/ and flights/. What is done
+    is not flown again; an interrupted run goes on where it was.
+
+    Example: rotorfault paper --case sinusoid --controller roismc
+    """
+    study = _load("studies.paper.study")
+    if case is not None or controller is not None:
+        for result in study.fly_part(out, case, controller, workers):
+            typer.echo(f"{result.run.id}: {study.line(result)}")
+        typer.echo(f"flights are in {out / 'flights'}; the whole paper: rotorfault paper --out {out}")
+        return
+    done = study.reproduce(out, quick, workers)
+    typer.echo(study.text(done))
+
+
+@app.command()
 def tune(
     controller: Annotated[str, typer.Argument(help="Registered controller with a search space: roismc, smc, ...")],
     generations: Annotated[int, typer.Option(min=1, help="Generations of the search.")] = 100,
@@ -231,6 +287,11 @@ def main() -> None:
         app(standalone_mode=True)
     except InputError as error:
         typer.echo(f"rotorfault: {error}", err=True)
+        sys.exit(2)
+    except OSError as error:
+        # A full disk, most of all: whatever was being written is not there.
+        where = "" if error.filename is None else f"{error.filename}: "
+        typer.echo(f"rotorfault: {where}{error.strerror or error}; nothing of it was written", err=True)
         sys.exit(2)
     except KeyboardInterrupt:
         typer.echo("rotorfault: interrupted", err=True)

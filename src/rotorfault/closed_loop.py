@@ -79,6 +79,15 @@ class ClosedLoop:
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
         """One sampling period: the state after it, and the signals at its beginning."""
+        memory, command, recorded = self.decide(state, drive, parameters)
+        time = state.steps * parameters.period
+        plant = self.plant.step(state.plant, command, time, parameters.plant, parameters.period)
+        return LoopState(plant, memory, state.steps + 1.0), recorded
+
+    def decide(
+        self, state: LoopState, drive: Drive, parameters: LoopParameters
+    ) -> tuple[AutopilotMemory, Command, Signals]:
+        """The sampling instant alone: the autopilot's memory after it, its command, and the signals."""
         time = state.steps * parameters.period
         truth = self.plant.observe(state.plant, time, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
@@ -90,8 +99,7 @@ class ClosedLoop:
             parameters.autopilot,
             parameters.period,
         )
-        plant = self.plant.step(state.plant, command, time, parameters.plant, parameters.period)
-        return LoopState(plant, memory, state.steps + 1.0), signals(truth, drive.reference, command, report)
+        return memory, command, signals(truth, command, report)
 
     def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """The true losses, for a diagnosis source that is an oracle; nothing for any other."""
@@ -101,10 +109,10 @@ class ClosedLoop:
         return true_loss(parameters.vehicle, plant.rotors, self.plant.fault(time - delay, parameters))
 
 
-def signals(truth: Truth, reference: Reference, command: Command, report: AutopilotReport) -> Signals:
+def signals(truth: Truth, command: Command, report: AutopilotReport) -> Signals:
     """What is recorded of one sampling instant."""
     seen, told, law = truth.measurement, report.diagnosis, report.control
-    left = report.allocation.unallocated
+    left, reference = report.allocation.unallocated, report.reference
     return Signals(
         position=seen.p_W,
         velocity=seen.v_W,
@@ -143,6 +151,8 @@ def signals(truth: Truth, reference: Reference, command: Command, report: Autopi
         gain_rate=law.gain_rate,
         riccati_residual=law.riccati_residual,
         riccati_guarded=law.riccati_guarded,
+        ground_force=truth.ground_force,
+        landing_stage=report.stage,
     )
 
 

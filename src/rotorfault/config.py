@@ -7,6 +7,7 @@ Configuration comes from TOML files or from Python. It is checked once, at the e
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -37,11 +38,14 @@ class Strict(BaseModel):
         # about the key that was meant.
         if isinstance(data, dict):
             allowed = [name if field.alias is None else field.alias for name, field in cls.model_fields.items()]
-            for key in data:
+            for key, value in data.items():
                 if key not in allowed and key not in cls.model_fields:
                     close = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.5)
                     hint = f"; did you mean '{close[0]}'?" if close else ""
                     raise refusal(str(key), f"unknown key{hint} (allowed: {', '.join(allowed)})")
+                # pydantic would take true for 1.
+                if isinstance(value, bool) and cls.model_fields[key].annotation in (float, int, float | None):
+                    raise refusal(str(key), f"got {str(value).lower()}; allowed: a number")
         return data
 
 
@@ -77,7 +81,21 @@ def explain(error: ValidationError, where: str) -> str:
     return f"{_one_line(details[0], where)}{more}"
 
 
+def passed_on(error: ValidationError) -> PydanticCustomError:
+    """The first thing that is wrong in a part, as the refusal to raise in the validator of the whole."""
+    details = error.errors(include_url=False)
+    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
+    keys, message = _parts(details[0])
+    return refusal(".".join(keys), f"{message}{more}")
+
+
 def _one_line(detail: ErrorDetails, where: str) -> str:
+    keys, message = _parts(detail)
+    return ": ".join(part for part in (where, ".".join(keys), message) if part)
+
+
+def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
+    """Path of the key that is wrong, and what is wrong with it."""
     keys = [str(part) for part in detail["loc"]]
     message = detail["msg"]
     if detail["type"] == _OWN:
@@ -86,9 +104,10 @@ def _one_line(detail: ErrorDetails, where: str) -> str:
     elif detail["type"] == "missing":
         message = "is missing; add it"
     else:
-        message = message.replace("Input should", "must").replace("Value error, ", "")
+        message = re.sub(r"^(Input|String|Tuple|List) should", "must", message).replace("Value error, ", "")
+        message = re.sub(r"a valid dictionary or instance of \w+", "a table", message)
         message += f"; got {_short(detail['input'])}"
-    return ": ".join(part for part in (where, ".".join(keys), " ".join(message.split())) if part)
+    return keys, " ".join(message.split())
 
 
 def _short(value: object) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import json
 from collections.abc import Mapping, Sequence
@@ -23,6 +24,7 @@ from rotorfault.metrics import Outcome, finite_or_none, first_loss, judge, summa
 from rotorfault.progress import Bar
 from rotorfault.report.text import summary_text
 from rotorfault.scenario import Scenario, load_scenario, override, scenario_from
+from rotorfault.touchdown import rested
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -174,6 +176,9 @@ def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list
     InputError
         If they differ in more; see `rotorfault.assembly.assemble_all`.
     """
+    for scenario in scenarios:
+        if not isinstance(scenario, Scenario):
+            raise InputError(f"got {scenario!r}; allowed: Scenario objects, such as load_scenario(...) returns")
     name = engine or default_engine(len(scenarios))
     recording = _run(assemble_all(scenarios), name, scenarios)
     return [_flight(scenario, recording, i, name, None) for i, scenario in enumerate(scenarios)]
@@ -187,6 +192,10 @@ def prepare(
 ) -> Scenario:
     """Check a scenario with what overrides it; see `fly`."""
     overrides: dict[str, Any] = {} if controller is None else {"controller.kind": controller}
+    if not isinstance(settings or {}, Mapping) or not all(isinstance(key, str) for key in settings or {}):
+        raise InputError(f"settings: got {settings!r}; allowed: dotted keys and values, such as {{'duration': 5.0}}")
+    if not isinstance(scenario, (str, Path, Mapping, Scenario)):
+        raise InputError(f"scenario: got {scenario!r}; allowed: a name, a path, tables or a Scenario")
     overrides |= dict(settings or {})
     if seed is not None:
         overrides["seed"] = seed
@@ -194,7 +203,7 @@ def prepare(
         return load_scenario(scenario, overrides)
     if isinstance(scenario, Scenario) and not overrides:
         return scenario
-    tables = scenario.as_tables() if isinstance(scenario, Scenario) else json.loads(json.dumps(dict(scenario)))
+    tables = scenario.as_tables() if isinstance(scenario, Scenario) else copy.deepcopy(dict(scenario))
     for key, value in overrides.items():
         override(tables, key, value)
     return scenario_from(tables, str(tables.get("name", "scenario")))
@@ -232,7 +241,9 @@ def load(path: str | Path) -> Flight:
 
 def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
     grounds = [scenario.ground for scenario in scenarios]
-    lost = np.zeros(batch.flights, dtype=bool)
+    lands = [scenario.on_fault.kind == "land" for scenario in scenarios]
+    spacing = scenarios[0].period * batch.every
+    over = np.zeros(batch.flights, dtype=bool)  # lost, or landed
     looked = 0
     with Bar("flying", batch.steps * scenarios[0].period, "s") as bar:
 
@@ -240,9 +251,11 @@ def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
             nonlocal looked
             bar.update(done * scenarios[0].period)
             fresh, looked = records[looked:], len(records)
-            for i in np.flatnonzero(~lost):
-                lost[i] = len(fresh) > 0 and first_loss(fresh[:, :, i], grounds[i]) is not None
-            return bool(lost.all())
+            for i in np.flatnonzero(~over):
+                over[i] = len(fresh) > 0 and first_loss(fresh[:, :, i], grounds[i]) is not None
+                if lands[i] and not over[i]:
+                    over[i] = rested(records[:, :, i], np.arange(len(records), dtype=float) * spacing) is not None
+            return bool(over.all())
 
         return load_engine(engine)(batch, watch)
 
@@ -250,9 +263,11 @@ def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
 def _flight(scenario: Scenario, recording: Recording, index: int, engine: str, own: str | None) -> Flight:
     signals = recording.signals[:, :, index]
     times = recording.steps * scenario.period
-    found = first_loss(signals, scenario.ground)
+    found, landed = first_loss(signals, scenario.ground), rested(signals, times)
     end = len(times)
-    if found is not None:
+    if landed is not None and (found is None or landed < found[0]):
+        end, outcome = landed + 1, Outcome("landed", float(times[landed]))
+    elif found is not None:
         # The record of the loss itself is kept where it has numbers, and the first in any case.
         end = max(1, found[0] + (1 if np.isfinite(signals[found[0]]).all() else 0))
         outcome = Outcome(found[1], float(times[found[0]]))

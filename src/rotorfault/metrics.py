@@ -3,7 +3,10 @@
 Every number is computed from the records of the flight alone, by the definitions given here:
 
 - *Outcome*: ``diverged`` (a state is not finite, or further than 10 km away), ``tumbled`` (tilt beyond 90 degrees)
-  or ``ground`` (below the scenario's ground), each with the time at which the flight ended; else ``settled``
+  or ``ground`` (crash: below the scenario's ground without a landing under way, or touched it during a landing
+  faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees), each with the time at which the flight
+  ended; ``landed`` (touched it more gently than that, and stood there with rotors stopped for 0.5 s or to the end,
+  which ends the flight); else ``settled``
   (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square error
   over the last half within 5 % of the reference's span on every axis) or ``offset`` (flew to the end, but neither).
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
@@ -11,6 +14,10 @@ Every number is computed from the records of the flight alone, by the definition
 - *Cost*: J = 1/2 int (e'Qe + u'Ru) dt with the printed weights (35), |e| floored at 0.01 m in both, e against the
   scenario's reference (roll and pitch reference 0), u the torque given [N m] and the commanded acceleration less
   gravity and feed-forward [m/s^2], after limits. The same for every law and preset.
+- A flight that has touched down during a landing has no settling time; its other numbers, but for those at the end,
+  are of the time in the air.
+- *Landing*: ``speed`` (downwards), ``horizontal_speed`` and ``tilt`` in the last record in the air, ``distance``
+  horizontally from where the fault struck to where it touched down.
 - *Detection* of a rotor: from its first true loss to the first flag. ``loss_estimated`` is the believed loss read
   150 ms after the onset, ``loss_error`` its largest error from then on.
 """
@@ -26,13 +33,14 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
 from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.touchdown import crashed, in_the_air, landing
 
 SETTLED = 0.02  # of the step
 TRACKED = 0.05  # of the span
 ERROR_FLOOR = 0.01  # m, in the cost's Q and R
 READ_AFTER = 0.15  # s after a fault at which the estimated loss is read
 FAR = 1e4  # m
-SURVIVED = ("settled", "tracked", "offset")
+SURVIVED = ("settled", "tracked", "offset", "landed")
 
 _ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
 _AXES = ("x", "y", "z")
@@ -42,12 +50,12 @@ _ANGLES = ("roll", "pitch", "yaw")
 class Outcome(NamedTuple):
     """How a flight ended."""
 
-    kind: str  # settled, tracked, offset, ground, tumbled, diverged, interrupted
+    kind: str  # settled, tracked, offset, landed, ground, tumbled, diverged, interrupted
     time: float  # s: end of the flight
 
     @property
     def survived(self) -> bool:
-        """Whether the vehicle was flying when the flight ended."""
+        """Whether the vehicle was sound when the flight ended: flying, or landed."""
         return self.kind in SURVIVED
 
     def __str__(self) -> str:
@@ -69,8 +77,8 @@ def first_loss(signals: Array, ground: float | None) -> tuple[int, str] | None:
     with np.errstate(invalid="ignore"):
         finite = np.isfinite(signals).all(axis=1) & (np.abs(position) < FAR).all(axis=1)
         upright = np.cos(attitude[:, 0]) * np.cos(attitude[:, 1]) > 0.0
-        above = np.ones(len(signals), dtype=bool) if ground is None else position[:, 2] >= ground
-    for_each = (("diverged", ~finite), ("tumbled", ~upright), ("ground", ~above))
+        fallen = np.zeros(len(signals), dtype=bool) if ground is None else crashed(signals, ground)
+    for_each = (("diverged", ~finite), ("tumbled", ~upright), ("ground", fallen))
     found = [(int(np.argmax(lost)), kind) for kind, lost in for_each if lost.any()]
     return min(found, key=lambda item: item[0]) if found else None
 
@@ -90,7 +98,9 @@ def constant_reference(data: xr.Dataset) -> bool:
 
 
 def judge(data: xr.Dataset) -> str:
-    """Outcome of a flight that flew to its end: settled, tracked or offset."""
+    """Outcome of a flight that flew to its end: settled, tracked, offset or landed."""
+    if "landing_stage" in data and data["landing_stage"].values[-1] > 1.5 and data["ground_force"].values[-1] > 0.0:
+        return "landed"
     error = np.abs(data["position"].values - data["position_reference"].values)
     if constant_reference(data):
         return "settled" if (error[-1] <= bands(data, SETTLED)).all() else "offset"
@@ -127,16 +137,35 @@ def attitude_error(data: xr.Dataset, against: str) -> NDArray[np.float64]:
     return np.asarray(np.arctan2(np.sin(gap), np.cos(gap)))
 
 
-def cost(data: xr.Dataset) -> float:
-    """Cost J of the flight, (19) with (35) as read in the module's docstring."""
+def cost(
+    data: xr.Dataset,
+    *,
+    against: str = "reference",
+    inputs: str = "torque",
+    floor: float = ERROR_FLOOR,
+    floor_r: float = ERROR_FLOOR,
+) -> float:
+    """Cost J of the flight, (19) with (35) as read in the module's docstring; other readings for comparison.
+
+    Parameters
+    ----------
+    against : {'reference', 'demand'}
+        What the attitude error is taken against.
+    inputs : {'torque', 'virtual'}
+        Attitude input: torque given [N m], or commanded angular acceleration [rad/s^2].
+    floor, floor_r : float
+        Floor of |e| in Q and in R, in m.
+    """
     e = data["position"].values - data["position_reference"].values
     e_dot = data["velocity"].values - data["velocity_reference"].values
-    angle, rate = attitude_error(data, "reference"), data["body_rates"].values
-    size = np.maximum(np.abs(e), ERROR_FLOOR)
+    angle, rate = attitude_error(data, against), data["body_rates"].values
+    size, size_r = (np.maximum(np.abs(e), least) for least in (floor, floor_r))
     u_position = data["virtual_position"].values
     u_attitude = data["torque_demand"].values - data["torque_unallocated"].values
+    if inputs == "virtual":
+        u_attitude = data["virtual_attitude"].values
     state = np.sum(angle**2 + rate**2 + 0.3 / size * e**2 + 0.005 * e_dot**2, axis=1)
-    effort = np.sum(0.0088 * u_attitude**2 + np.array([0.2, 0.2, 0.4]) * size**2 * u_position**2, axis=1)
+    effort = np.sum(0.0088 * u_attitude**2 + np.array([0.2, 0.2, 0.4]) * size_r**2 * u_position**2, axis=1)
     return float(0.5 * np.trapezoid(state + effort, data["time"].values))
 
 
@@ -186,6 +215,9 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
     limits : (2,) float
         Least and largest thrust of a rotor in N.
     """
+    whole, data = data, in_the_air(data)
+    grounded = len(data["time"]) < len(whole["time"])
+    last = whole.isel(time=[-1])
     command = data["thrust_command"].values
     error = data["position"].values - data["position_reference"].values
     attitude = data["attitude"].values
@@ -198,12 +230,12 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
         "outcome": outcome.kind,
         "survived": outcome.survived,
         "end_time": outcome.time,
-        "settle_time": settle_times(data) if outcome.survived else nobody,
+        "settle_time": settle_times(data) if outcome.survived and not grounded else nobody,
         "position_mse": _per(_AXES, np.mean(error**2, axis=0)),
         "attitude_mse": _per(_ANGLES, np.mean(attitude_error(data, "reference") ** 2, axis=0)),
         "attitude_demand_mse": _per(_ANGLES, np.mean(attitude_error(data, "demand") ** 2, axis=0)),
-        "position_error_end": _per(_AXES, error[-1]),
-        "attitude_end": _per(_ANGLES, attitude[-1]),
+        "position_error_end": _per(_AXES, (last["position"] - last["position_reference"]).values[0]),
+        "attitude_end": _per(_ANGLES, last["attitude"].values[0]),
         "cost": cost(data),
         "tilt_max": float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
         "attitude_max": _per(_ANGLES, np.abs(attitude).max(axis=0)),
@@ -213,6 +245,7 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
         "given_up_fraction": _per(("tilt", "thrust", "yaw"), np.mean(data["given_up"].values > 0.5, axis=0)),
         "detections": detections(data),
         "false_alarms": false_alarms(data),
+        "landing": landing(whole),
         "largest_riccati_residual": float(data["riccati_residual"].values.max()),
         "riccati_guarded_fraction": float(np.mean(data["riccati_guarded"].values > 0.5)),
     }

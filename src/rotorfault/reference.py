@@ -21,7 +21,7 @@ from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, field_serializer, model_validator
 
 from rotorfault.config import Strict, refusal
 from rotorfault.errors import InputError
@@ -278,6 +278,13 @@ class Function:
             description="The function, or where it is: 'package.module:name'. It takes the time [s] and returns "
             "x, y, z [m] and yaw [rad], or a Reference with all derivatives"
         )
+
+        @field_serializer("function")
+        def _place(self, function: Callable[[float], Any] | str) -> str:
+            # A file cannot hold a function, but can say where it was; one of a module is found there again.
+            if isinstance(function, str):
+                return function
+            return f"{getattr(function, '__module__', '?')}:{getattr(function, '__qualname__', repr(function))}"
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings

@@ -25,6 +25,7 @@ from rotorfault.allocation.attainable import thrust_available
 from rotorfault.control.protocol import ControlInputs, ControlOutput, Prediction
 from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.linearisation import Complex
+from rotorfault.records import flatten, unflatten
 from rotorfault.scenario import Scenario
 from rotorfault.signals import Measurement, Reference
 from rotorfault.vehicle import Vehicle
@@ -157,7 +158,11 @@ def sampled_data_check(
         places.append(("at the start", measurement, target if reference is None else reference))
     found: dict[str, str] = {}
     for where, seen, wanted in places:
-        for gains in reported_gains(controller, vehicle, period, seen, wanted):
+        try:
+            reported = reported_gains(controller, vehicle, period, seen, wanted)
+        except (ZeroDivisionError, OverflowError):
+            return [f"{where}: the controller's gains are not finite; its settings are too extreme for doubles"]
+        for gains in reported:
             line = warning(gains, period, vehicle.rotor_bandwidth, where)
             if line is not None:
                 found.setdefault(gains.axis, line)
@@ -175,11 +180,13 @@ def sampled_data_warnings(scenario: Scenario, controller: Any = None) -> list[st
     """
     s = scenario.start
     start = Measurement(*(Vec3.of(part) for part in (s.position, s.velocity, s.attitude, s.body_rates)))
-    table = scenario.reference.make().table(np.zeros(1))
+    with np.errstate(all="ignore"):  # numbers that are not finite are told of by the flight
+        first = scenario.reference.make().table(np.zeros(1)).at(0)
+    reference: Reference = unflatten(first, [float(leaf) for leaf in flatten(first)])
     return sampled_data_check(
         scenario.controller.make() if controller is None else controller,
         scenario.vehicle.vehicle,
         scenario.period,
         start,
-        table.at(0),
+        reference,
     )

@@ -16,11 +16,12 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, model_validator
 
 from rotorfault.allocation import ALLOCATORS
-from rotorfault.config import Strict, Three, explain, parse_toml, read_text, refusal, validate
-from rotorfault.control import CONTROLLERS
+from rotorfault.config import Strict, Three, parse_toml, passed_on, read_text, refusal, validate
+from rotorfault.control import CONTROLLERS, RESPONSES
 from rotorfault.diagnosis import DIAGNOSES
 from rotorfault.errors import InputError
 from rotorfault.plant import FAULTS, PLANTS, SENSORS, WINDS
+from rotorfault.plant.ground import LARGEST_STEP
 from rotorfault.presets import preset
 from rotorfault.reference import REFERENCES
 from rotorfault.registry import Registry, unknown
@@ -28,6 +29,8 @@ from rotorfault.vehicle import Vehicle
 from rotorfault.vehicle_file import VehicleFile, load_vehicle
 
 PERIOD_TOLERANCE = 1e-9  # relative: how exactly the step must divide the sampling period
+MOST_SUBSTEPS = 1000  # per sampling period
+MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
 
 class Part:
@@ -69,15 +72,16 @@ def _part(registry: Registry[Any], default: str | None = None) -> Any:
         if "kind" not in table:
             raise refusal("kind", f"is missing; allowed: {', '.join(registry)}")
         kind = table["kind"]
-        if kind not in registry:
+        if not isinstance(kind, str) or kind not in registry:
             raise refusal("kind", unknown(registry.sort, kind, list(registry)))
         settings = {key: item for key, item in table.items() if key != "kind"}
+        if registry is CONTROLLERS and not isinstance(settings.get("preset", ""), str):
+            raise refusal("preset", f"got {settings['preset']!r}; allowed: the name of a preset")
         try:
             settings = preset(kind, settings) if registry is CONTROLLERS else settings
             return Part(registry, kind, registry[kind].Settings.model_validate(settings))
         except ValidationError as error:
-            key, _, message = explain(error, "").partition(": ")
-            raise refusal(key, message) from None
+            raise passed_on(error) from None
         except InputError as error:
             raise refusal("", str(error)) from None
 
@@ -123,10 +127,11 @@ def _vehicle(value: Any) -> VehicleFile:
     try:
         if isinstance(value, (str, Path)):
             return load_vehicle(value)
+        if not isinstance(value, dict):
+            raise refusal("", f"got {value!r}; allowed: name of a vehicle, path that ends in .toml, or its tables")
         return VehicleFile.model_validate(value)
     except ValidationError as error:
-        key, _, message = explain(error, "").partition(": ")
-        raise refusal(key, message) from None
+        raise passed_on(error) from None
     except InputError as error:
         raise refusal("", str(error)) from None
 
@@ -139,15 +144,17 @@ class Scenario(Strict):
     vehicle: Annotated[Any, BeforeValidator(_vehicle)] = Field(description="name, path or table of a vehicle")
     plant: str = Field(default="rigid_body", description="model of the body: paper_model | rigid_body")
     duration: float = Field(gt=0.0, le=3600.0, description="length of the flight [s]")
-    period: float = Field(default=0.001, gt=0.0, description="sampling period of the autopilot [s]")
+    period: float = Field(default=0.001, gt=0.0, le=1.0, description="sampling period of the autopilot [s]")
     step: float | None = Field(
         default=None, gt=0.0, description="integration step [s]; the sampling period up to 1 ms if not given"
     )
     record_period: float | None = Field(
         default=None, gt=0.0, description="time between two records [s]; the sampling period if not given"
     )
-    ground: float | None = Field(default=None, description="height of the ground [m]; none if not given")
-    seed: int = Field(default=0, ge=0, description="names the random numbers of sensor noise")
+    ground: float | None = Field(
+        default=None, description="height of the centre of mass standing on the ground [m]; none if not given"
+    )
+    seed: int = Field(default=0, ge=0, le=10**12, description="names the random numbers of sensor noise")
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
     reference: _part(REFERENCES) = Field(description="where the vehicle shall be")  # type: ignore[valid-type]
@@ -164,6 +171,10 @@ class Scenario(Strict):
         default="effectiveness", validate_default=True, description="control allocation"
     )
 
+    on_fault: _part(RESPONSES, "continue") = Field(  # type: ignore[valid-type]
+        default="continue", validate_default=True, description="what the autopilot does about a confirmed fault"
+    )
+
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:
         if self.plant not in PLANTS:
@@ -178,10 +189,29 @@ class Scenario(Strict):
             raise refusal(
                 "record_period", f"got {self.record_period:g} s; allowed: a multiple of the period {self.period:g} s"
             )
+        if self.ground is None and self.on_fault.kind == "land":
+            raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
+        if self.ground is not None and self.period / self.substeps > LARGEST_STEP * (1.0 + PERIOD_TOLERANCE):
+            raise refusal(
+                "step", f"got {self.step:g} s; allowed with ground: up to {LARGEST_STEP:g} s, for contact is stiff"
+            )
         if self.duration < self.period:
             raise refusal("duration", f"got {self.duration:g} s; allowed: at least one period, {self.period:g} s")
         if not self.duration / self.period < 5e7:
-            raise refusal("duration", f"{self.duration / self.period:.3g} sampling periods; allowed: up to 5e7")
+            raise refusal(
+                "duration",
+                f"got {self.duration:g} s, {self.duration / self.period:.3g} periods; allowed: fewer than 5e7",
+            )
+        if self.step is not None and self.substeps > MOST_SUBSTEPS:
+            raise refusal(
+                "step", f"got {self.step:g} s; allowed: at least period/1000, {self.period / MOST_SUBSTEPS:g} s"
+            )
+        if self.steps / self.every > MOST_RECORDS:
+            raise refusal(
+                "record_period",
+                f"{self.steps / self.every:.3g} records take more memory than there is; allowed: up to "
+                f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
+            )
         return self
 
     @property

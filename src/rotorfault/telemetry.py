@@ -35,10 +35,10 @@ class Signals(NamedTuple):
     velocity: Annotated[Vec3, Q("m/s", W, "true velocity")]
     attitude: Annotated[Vec3, Q("rad", RPY, "true attitude")]
     body_rates: Annotated[Vec3, Q("rad/s", B, "true body rates (Euler rates on paper_model)")]
-    position_reference: Annotated[Vec3, Q("m", W, "where the scenario wants the vehicle")]
+    position_reference: Annotated[Vec3, Q("m", W, "where the vehicle shall be: of the scenario, or of a landing")]
     velocity_reference: Annotated[Vec3, Q("m/s", W, "its derivative")]
     acceleration_reference: Annotated[Vec3, Q("m/s^2", W, "acceleration fed forward")]
-    yaw_reference: Annotated[Scalar, Q("rad", RPY, "yaw that the scenario wants")]
+    yaw_reference: Annotated[Scalar, Q("rad", RPY, "yaw that the vehicle shall have")]
     attitude_demand: Annotated[Vec3, Q("rad", RPY, "attitude that the position loop asks for")]
     attitude_command: Annotated[Vec3, Q("rad", RPY, "demand after the command filter")]
     wind: Annotated[Vec3, Q("m/s", W, "true velocity of the air")]
@@ -68,6 +68,8 @@ class Signals(NamedTuple):
     gain_rate: Annotated[Mat3, Q("1/s", RPY, "gain matrix on the rate error")]
     riccati_residual: Annotated[Scalar, Q("1", NO_FRAME, "relative residual of the attitude Riccati equation")]
     riccati_guarded: Annotated[Scalar, Q("1", NO_FRAME, "1 where the guaranteed gain was flown")]
+    ground_force: Annotated[Scalar, Q("N", W, "true upward force of the ground")]
+    landing_stage: Annotated[Scalar, Q("1", NO_FRAME, "0 as the scenario wants, 1 descending, 2 rotors stopped")]
 
 
 def _template() -> Any:

@@ -162,10 +162,10 @@ def trim_report(
     Raises
     ------
     InputError
-        If the period is not positive and finite, or there is no such vehicle, controller or preset.
+        If the period is not above 0 and up to 1 s, or there is no such vehicle, controller or preset.
     """
-    if not 0.0 < period < math.inf:
-        raise InputError(f"period: got {period!r} s; allowed: greater than 0")
+    if not 0.0 < period <= 1.0:
+        raise InputError(f"period: got {period!r} s; allowed: greater than 0, up to 1")
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)

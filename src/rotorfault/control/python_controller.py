@@ -11,6 +11,7 @@ controller that shall run in every engine is a block in the scalar style instead
 
 from __future__ import annotations
 
+import traceback
 from typing import Any, NamedTuple, Protocol
 
 from rotorfault.control.protocol import ControlInputs, Controller, ControlOutput, no_telemetry
@@ -65,14 +66,22 @@ class PythonController:
         Raises
         ------
         InputError
-            If what it returns is no wrench of four numbers.
+            If it raises anything, or what it returns is no wrench of four numbers.
         """
         time = memory.steps * parameters.period
-        wrench = self.inner.update(time, inputs.measurement, inputs.reference, inputs.vehicle)
+        name = type(self.inner).__name__
+        try:
+            wrench = self.inner.update(time, inputs.measurement, inputs.reference, inputs.vehicle)
+        except Exception as error:
+            # Told at once: the engine would take a division by zero in here for a flight that is lost.
+            frame = traceback.extract_tb(error.__traceback__)[-1]
+            raise InputError(
+                f"controller {name}.update at t = {time:g} s: {type(error).__name__}: {' '.join(str(error).split())} "
+                f"({frame.filename}, line {frame.lineno})"
+            ) from error
         try:
             thrust, roll, pitch, yaw = (float(x) for x in flatten(wrench))
         except (TypeError, ValueError):
-            name = type(self.inner).__name__
             raise InputError(
                 f"controller {name}.update returned {wrench!r}; allowed: Wrench(thrust, Vec3(roll, pitch, yaw))"
             ) from None

@@ -37,9 +37,9 @@ class Key(NamedTuple):
     lasting: bool
 
 
-def key(loop: ClosedLoop, compiler: str) -> Key:
-    """Name of the compiled form of a loop."""
-    words = [_package_digest(), compiler, _processor(), *structure(loop)]
+def key(loop: ClosedLoop, compiler: str, form: str = "whole") -> Key:
+    """Name of a compiled form of a loop."""
+    words = [_package_digest(), compiler, form, _processor(), *structure(loop)]
     lasting = True
     for part in parts_of(loop):
         if not type(part).__module__.startswith("rotorfault."):

@@ -16,7 +16,9 @@ def structure(loop: ClosedLoop) -> tuple[str, ...]:
     """Words that are equal for two loops exactly when their compiled code is."""
     plant, autopilot = loop.plant, loop.autopilot
     words = [describe(part) for part in (plant.model, plant.wind, *plant.faults, loop.sensors)]
-    words += [describe(autopilot.diagnoser), describe(autopilot.controller)]
+    words += [
+        describe(part) for part in (plant.ground, autopilot.diagnoser, autopilot.response, autopilot.controller)
+    ]
     words.append(describe(autopilot.allocator, floats=True))
     return (*words, repr(autopilot.diagnoser.oracle_delay), repr(plant.substeps))
 
@@ -25,8 +27,8 @@ def parts_of(loop: ClosedLoop) -> list[Any]:
     """All parts of a loop."""
     plant, autopilot = loop.plant, loop.autopilot
     return [
-        plant.model, plant.wind, *plant.faults, loop.sensors,
-        autopilot.diagnoser, autopilot.controller, autopilot.allocator,
+        plant.model, plant.wind, *plant.faults, *([] if plant.ground is None else [plant.ground]), loop.sensors,
+        autopilot.diagnoser, autopilot.response, autopilot.controller, autopilot.allocator,
     ]  # fmt: skip
 
 

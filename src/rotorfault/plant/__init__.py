@@ -5,6 +5,7 @@ complete.
 """
 
 from rotorfault.plant.faults import FAULTS, Fault, RotorFault, rotor_faults
+from rotorfault.plant.ground import Ground
 from rotorfault.plant.models import PLANTS, BodyModel
 from rotorfault.plant.paper_model import PaperModel
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
@@ -20,6 +21,7 @@ __all__ = [
     "Air",
     "BodyModel",
     "Fault",
+    "Ground",
     "Normals",
     "PaperModel",
     "Plant",

@@ -2,7 +2,8 @@
 
 The command is held over the period. The rotor lag is part of the integrated state. Wind is taken at the stage
 times of the integrator; faults once at the start of each sub-step, so that one that sets in on a sub-step's
-boundary acts exactly from there on and never costs the integrator its order.
+boundary acts exactly from there on and never costs the integrator its order. Ground is a choice of structure: a
+flight without it has none of its operations.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple, final
 from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor, Vec3
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
+from rotorfault.plant.ground import Ground
 from rotorfault.plant.integrator import rk4
 from rotorfault.plant.models import BodyModel
 from rotorfault.plant.rotors import (
@@ -24,7 +26,7 @@ from rotorfault.plant.rotors import (
 )
 from rotorfault.plant.wind import Air, Wind
 from rotorfault.scalar import Scalar
-from rotorfault.signals import Command, Measurement
+from rotorfault.signals import Command, Measurement, Wrench
 from rotorfault.vehicle import Vehicle, residual_speed, wrench_of
 
 
@@ -34,6 +36,7 @@ class PlantParameters(NamedTuple):
     vehicle: Vehicle
     wind: Any  # record of the wind
     faults: tuple[Any, ...]  # one record per fault
+    ground: Any = ()  # record of the ground; empty without one
 
 
 class PlantState(NamedTuple):
@@ -51,6 +54,7 @@ class Truth(NamedTuple):
     rotor_speed: PerRotor  # rad/s, without sign
     loss: PerRotor  # 0 sound .. 1 dead
     air: Air
+    ground_force: Scalar  # N, upwards
 
 
 class _Motion(NamedTuple):
@@ -73,6 +77,7 @@ class Plant:
     faults : sequence of Fault
     substeps : int
         Runge-Kutta steps per sampling period, at least 1.
+    ground : Ground, optional
 
     Raises
     ------
@@ -80,14 +85,22 @@ class Plant:
         If `substeps` is below 1.
     """
 
-    def __init__(self, model: BodyModel, wind: Wind, faults: Sequence[Fault], substeps: int) -> None:
+    def __init__(
+        self, model: BodyModel, wind: Wind, faults: Sequence[Fault], substeps: int, ground: Ground | None = None
+    ) -> None:
         if substeps < 1:
             raise InputError(f"substeps: got {substeps}; allowed: 1 or more")
         self.model, self.wind, self.faults, self.substeps = model, wind, tuple(faults), substeps
+        self.ground = ground
 
     def parameters(self, vehicle: Vehicle) -> PlantParameters:
         """Numbers of the truth for a vehicle; any of them may be changed before a flight."""
-        return PlantParameters(vehicle, self.wind.parameters(), tuple(fault.parameters() for fault in self.faults))
+        return PlantParameters(
+            vehicle,
+            self.wind.parameters(),
+            tuple(fault.parameters() for fault in self.faults),
+            () if self.ground is None else self.ground.parameters(vehicle),
+        )
 
     def initial(
         self,
@@ -131,22 +144,28 @@ class Plant:
         command = command._replace(thrust=limited_command(parameters.vehicle, command.thrust))
         dt = period * (1.0 / self.substeps)
         for k in range(self.substeps):
-            state = self._substep(state, command, time + k * dt, parameters, dt)
+            state = self.substep(state, command, time + k * dt, parameters, dt)
         return state
 
-    def _substep(
+    def substep(
         self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, dt: Scalar
     ) -> PlantState:
+        """State one integration step of length dt [s] later, the command held."""
         vehicle = parameters.vehicle
         fault = rotor_faults(self.faults, parameters.faults, time)
 
         def derivative(motion: _Motion) -> _Motion:
             thrust = delivered_thrust(vehicle, motion.rotors, fault)
             speeds = true_rotor_speeds(vehicle, motion.rotors, fault)
+            wrench, extra_W = wrench_of(vehicle, thrust), command.direct_acceleration_W
+            if self.ground is not None:
+                contact = self.ground.contact(self.model.observe(motion.body), parameters.ground)
+                wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
+                extra_W = extra_W + contact.force_W / vehicle.mass
             body_dot = self.model.derivative(
                 motion.body,
-                wrench_of(vehicle, thrust),
-                command.direct_acceleration_W,
+                wrench,
+                extra_W,
                 vehicle,
                 residual_speed(vehicle, speeds),
                 self.wind.at(motion.time, parameters.wind),
@@ -159,12 +178,15 @@ class Plant:
     def observe(self, state: PlantState, time: Scalar, parameters: PlantParameters) -> Truth:
         """The truth at a time in s since the start of the flight."""
         vehicle, fault = parameters.vehicle, self.fault(time, parameters)
+        measurement = self.model.observe(state.body)
+        ground = self.ground
         return Truth(
-            measurement=self.model.observe(state.body),
+            measurement=measurement,
             thrust=delivered_thrust(vehicle, state.rotors, fault),
             rotor_speed=true_rotor_speeds(vehicle, state.rotors, fault),
             loss=true_loss(vehicle, state.rotors, fault),
             air=self.wind.at(time, parameters.wind),
+            ground_force=0.0 if ground is None else ground.contact(measurement, parameters.ground).normal,
         )
 
     def fault(self, time: Scalar, parameters: PlantParameters) -> RotorFault:

@@ -18,7 +18,7 @@ def labelled(paths: Sequence[Path]) -> dict[str, Flight]:
     loaded = [load(path) for path in paths]
     labels = [flight.label for flight in loaded]
     if len(set(labels)) < len(labels):
-        labels = [f"{label} ({path.parent.name})" for label, path in zip(labels, paths, strict=True)]
+        labels = [f"{label} ({path.resolve().parent.name})" for label, path in zip(labels, paths, strict=True)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} {number}" for number, label in enumerate(labels, start=1)]
     return dict(zip(labels, loaded, strict=True))

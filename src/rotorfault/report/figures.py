@@ -23,6 +23,7 @@ from rotorfault.files import output_folder, write_atomically
 from rotorfault.report.detection_figure import detection_figure
 from rotorfault.report.panels import (
     REFERENCE,
+    Curve,
     Drawn,
     Panel,
     dashed,
@@ -37,7 +38,7 @@ from rotorfault.report.panels import (
     whole,
 )
 from rotorfault.report.path_figure import path_figure
-from rotorfault.report.style import DPI, STYLE, new_figure, span
+from rotorfault.report.style import DPI, ORANGE, SKY, STYLE, new_figure, span
 
 DECADES = 12  # of V that are shown at most
 FORMATS = ("png", "svg", "pdf")
@@ -98,9 +99,14 @@ def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[st
     paths = []
     with rc_context(STYLE):
         for name, figure in figures.items():
+            engine = figure.get_layout_engine()
             for kind in formats:
                 paths.append(folder / f"{name}.{kind}")
                 write_atomically(paths[-1], partial(_write, figure, kind))
+                # The layout that was found for the first format holds for the others, and is what takes time.
+                figure.set_layout_engine("none")
+            if engine is not None:
+                figure.set_layout_engine(engine)
     return paths
 
 
@@ -110,16 +116,43 @@ def _write(figure: Figure, kind: str, path: Path) -> None:
     figure.savefig(path, format=kind, dpi=DPI, metadata=undated.get(kind))
 
 
-def _position(drawn: Sequence[Drawn]) -> Figure:
-    figure = new_figure(9.5)
+# Apart from the flights' colours, and apart from each other where one curve lies on another.
+WIND: tuple[dict[str, Any], ...] = (
+    {"color": SKY, "linestyle": "-", "linewidth": 2.2, "zorder": 2.2},
+    {"color": ORANGE, "linestyle": "-", "linewidth": 1.2, "zorder": 2.3},
+    {"color": "0.2", "linestyle": "-", "linewidth": 0.7, "zorder": 2.4},
+)
+
+
+def position_figure(drawn: Sequence[Drawn], wind: bool = False, error: bool = False) -> Figure:
+    """Position and reference.
+
+    With `wind`, a strip below has the disturbance acceleration on each axis; with `error`, the distance from the
+    reference stands beside the position, for flights that follow it so closely that a detail would show nothing.
+    """
+    figure = new_figure(11.5 if wind else 9.5)
     reach = 10.0 if len(drawn) == 1 else 3.0
     panels = [
         Panel(name, (solid("position", k), dashed("position_reference", k)), reach, follows=1.0)
         for k, name in enumerate("xyz")
     ]
-    timeline(figure, panels, drawn)
-    legend(figure, drawn, [sample("reference", **REFERENCE)])
+    errors = [Panel(f"{name} error", (solid("position_error", k),)) for k, name in enumerate("xyz")] if error else []
+    handles = [sample("reference", **REFERENCE)]
+    if wind:
+        curves = tuple(Curve("disturbance", k, style, shared=True) for k, style in enumerate(WIND))
+        panels.append(Panel("wind", curves, np.inf, height=0.75))
+        errors += panels[-1:] if error else []
+        handles += [sample(f"wind on {name}", **style) for name, style in zip("xyz", WIND, strict=True)]
+    if error:
+        drawn = [flight._replace(data=_with_error(flight.data)) for flight in drawn]
+    timeline(figure, panels, drawn, beside=errors)
+    legend(figure, drawn, handles)
     return figure
+
+
+def _with_error(data: xr.Dataset) -> xr.Dataset:
+    difference = data["position"] - data["position_reference"]
+    return data.assign(position_error=difference.assign_attrs(units=data["position"].attrs["units"]))
 
 
 def _attitude(drawn: Sequence[Drawn]) -> Figure:
@@ -186,7 +219,7 @@ def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
 
 
 FIGURES = {
-    "position": _position,
+    "position": position_figure,
     "attitude": _attitude,
     "rotor_speeds": _rotor_speeds,
     "path": path_figure,

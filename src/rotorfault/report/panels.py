@@ -135,6 +135,7 @@ class Panel(NamedTuple):
     reach: float = REACH
     core: float | None = None  # plus and minus what the panel is meant to show at least to be cut beyond it
     follows: float | None = None  # least span where the second curve and the starts are what sets the scale
+    height: float = 1.0  # in proportion to the other panels of the figure
 
 
 def solid(signal: str, column: int | None = None) -> Curve:
@@ -160,11 +161,12 @@ def draw_panel(axes: Axes, panel: Panel, drawn: Sequence[Drawn], window: tuple[f
             axes.plot(*envelope(time, values), **style)
             parts.append(values)
     _limit(axes, parts, _core(panel, drawn, window), panel.reach)
-    for flight in drawn:
-        _mark_end(axes, flight, panel.curves[0], window)
+    if not panel.curves[0].shared:
+        for flight in drawn:
+            _mark_end(axes, flight, panel.curves[0], window)
     axes.set_xlim(*window)
-    axes.xaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(max(2, round(5 * panel.height)), steps=[1, 2, 2.5, 5, 10]))
     mark_onsets(axes, drawn, window)
 
 
@@ -290,20 +292,28 @@ def detail(drawn: Sequence[Drawn]) -> tuple[float, float] | None:
     return window if window[1] <= end and window[1] - window[0] < DETAIL * end else None
 
 
-def timeline(figure: Figure, panels: Sequence[Panel], drawn: Sequence[Drawn], common: bool = False) -> None:
+def timeline(
+    figure: Figure,
+    panels: Sequence[Panel],
+    drawn: Sequence[Drawn],
+    common: bool = False,
+    beside: Sequence[Panel] | None = None,
+) -> None:
     """Panels below each other over the whole flight, and beside them a detail of the first seconds where useful.
 
-    With `common`, all panels have one scale.
+    With `common`, all panels have one scale. With `beside`, these panels stand there instead, over the whole flight.
     """
-    close = detail(drawn)
-    windows = [whole(drawn)] if close is None else [whole(drawn), close]
-    grid = figure.subplots(len(panels), len(windows), squeeze=False, sharex="col")
-    for row, panel in zip(grid, panels, strict=True):
-        for axes, window in zip(row, windows, strict=True):
-            draw_panel(axes, panel, drawn, window)
+    close = None if beside else detail(drawn)
+    windows = [whole(drawn)] * 2 if beside else [whole(drawn)] if close is None else [whole(drawn), close]
+    heights = {"height_ratios": [panel.height for panel in panels]}
+    grid = figure.subplots(len(panels), len(windows), squeeze=False, sharex="col", gridspec_kw=heights)
+    for row, panel, other in zip(grid, panels, beside or panels, strict=True):
+        for axes, window, one in zip(row, windows, (panel, other), strict=False):
+            draw_panel(axes, one, drawn, window)
             if close is not None and axes is row[0]:
                 axes.axvspan(*close, color=LIGHT, linewidth=0.0, zorder=0.5)
-        row[0].set_ylabel(f"{panel.name} {drawn[0].unit_of(panel.curves[0].signal)}")
+            if axes is row[0] or beside:
+                axes.set_ylabel(f"{one.name} {drawn[0].unit_of(one.curves[0].signal)}")
     if common:
         one_scale(grid.flat)
     if close is not None:
@@ -311,7 +321,8 @@ def timeline(figure: Figure, panels: Sequence[Panel], drawn: Sequence[Drawn], co
         grid[0, 1].set_title(f"shaded part, {close[0]:g} s to {close[1]:g} s")
     for axes in grid[-1]:
         axes.set_xlabel("time (s)")
-    figure.align_ylabels(grid[:, 0])
+    for column in grid.T:
+        figure.align_ylabels(column)
 
 
 def one_scale(panels: Iterable[Axes]) -> None:

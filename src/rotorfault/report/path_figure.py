@@ -16,6 +16,7 @@ from rotorfault.report.style import BLACK, GREY, Array, extremes, new_figure, sp
 
 START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
 FAULT: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 4.5, "markeredgecolor": BLACK}
+SAME_PLACE = 0.03  # of the largest side of a reference: points closer than this are one place
 EDGE = 0.96  # share of the figure that the box with its labels takes
 TARGET: dict[str, Any] = {"linestyle": "", "marker": "*", "markersize": 9.0, "color": BLACK}
 
@@ -99,6 +100,15 @@ def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
     return low - spare, high + spare
 
 
+def _once(path: Array) -> Array:
+    """A path with gaps (NaN) where it has been before: dashes drawn twice would fill each other's gaps."""
+    cell = SAME_PLACE * float(np.ptp(path, axis=0).max())
+    _, first, cells = np.unique(np.floor(path / cell), axis=0, return_index=True, return_inverse=True)
+    cells = cells.reshape(-1)
+    visit = np.cumsum(np.diff(cells, prepend=cells[0]) != 0)
+    return np.where((visit == visit[first][cells])[:, None], path, np.nan)
+
+
 def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
     """Draw where the flights were to go: a path where the reference moves, a star where it ends."""
     handles: list[Any] = []
@@ -106,6 +116,7 @@ def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
     for flight in drawn:
         wanted = flight.values("position_reference")
         if np.ptp(wanted, axis=0).max() > 1e-9:
+            wanted = _once(wanted)
             kept = np.unique(np.concatenate([extremes(wanted[:, k]) for k in range(3)]))
             axes.plot(*wanted[kept].T, **REFERENCE, zorder=5)
             name, style = "reference", REFERENCE

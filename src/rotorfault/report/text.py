@@ -13,6 +13,10 @@ def number(value: float | None, unit: str = "", digits: int = 4) -> str:
     return f"{value:.{digits}g}{' ' + unit if unit else ''}"
 
 
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
 def per_axis(values: dict[str, float | None], unit: str = "", digits: int = 3) -> str:
     """Named numbers on one line."""
     return "  ".join(f"{name} {number(value, digits=digits)}" for name, value in values.items()) + f" {unit}".rstrip()
@@ -32,7 +36,7 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("cost J", number(summary["cost"], digits=5)),
         (
             "largest tilt",
-            f"{number(summary['tilt_max'], 'rad', 3)} ({number(math.degrees(summary['tilt_max']), 'deg', 3)})",
+            f"{number(summary['tilt_max'], 'rad', 3)} ({number(_degrees(summary['tilt_max']), 'deg', 3)})",
         ),
         ("total variation of commands", number(summary["control_total_variation"], "N")),
         ("time with a rotor at its limit", number(100.0 * summary["saturated_fraction"], "%", 3)),
@@ -46,10 +50,31 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
                 f"(true {hit['loss_true']:.3g})"
             )
         found.append((f"fault of rotor {hit['rotor']} at {hit['true_time']:g} s", text))
+    if summary.get("landing") is not None:
+        found += landing_rows(summary["landing"])
     found.append(("false alarms", str(summary["false_alarms"])))
-    if summary["largest_riccati_residual"] > 0.0:
+    if (summary["largest_riccati_residual"] or 0.0) > 0.0:
         found.append(("largest Riccati residual", f"{summary['largest_riccati_residual']:.2g}"))
     return found
+
+
+def landing_rows(landing: dict[str, Any]) -> list[tuple[str, str]]:
+    """Label and text of each line about a landing."""
+    found = [("landing begun at", number(landing["confirmed_time"], "s"))]
+    if landing["touch_down_time"] is None:
+        return [*found, ("touch-down", "none")]
+    stopped = landing["rotors_stopped_time"]
+    return [
+        *found,
+        ("touch-down at", number(landing["touch_down_time"], "s")),
+        (
+            "  speed down, sideways; tilt",
+            f"{number(landing['speed'], 'm/s', 3)}, {number(landing['horizontal_speed'], 'm/s', 3)}; "
+            f"{number(landing['tilt'], 'rad', 3)} ({number(math.degrees(landing['tilt']), 'deg', 3)})",
+        ),
+        ("  distance from the fault", number(landing["distance"], "m", 3)),
+        ("  rotors stopped", "no" if stopped is None else f"at {number(stopped, 's')}"),
+    ]
 
 
 def summary_text(summary: dict[str, Any]) -> str:

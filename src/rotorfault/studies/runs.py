@@ -82,6 +82,16 @@ class Store:
         (folder / "flights").mkdir(parents=True, exist_ok=True)
         (folder / "runs").mkdir(exist_ok=True)
 
+    @property
+    def recipe(self) -> tuple[str, Measure | None, str]:
+        """Arguments of `from_recipe`, to open the same store in another process."""
+        return str(self.folder), self._measure, self._label
+
+    @classmethod
+    def from_recipe(cls, folder: str, measure: Measure | None, label: str) -> Store:
+        """Open a store from its recipe."""
+        return cls(Path(folder), measure, label)
+
     def get(self, run: Run) -> Result:
         """The result of a run, flown now if it is not there yet."""
         scenario = load_scenario(run.scenario, dict(run.overrides))

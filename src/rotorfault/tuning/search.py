@@ -113,6 +113,8 @@ def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[li
         ]
         scenarios = [one.model_copy(update={"controller": part.controller}) for part in parts for one in group]
         recording = load_engine(default_engine(len(scenarios)))(assemble_all(scenarios), no_watch)
+        if recording.interrupted:
+            raise KeyboardInterrupt  # half a flight must not be judged
         times = recording.steps * first.period
         scores = [objective(one, recording.signals[:, :, i], times) for i, one in enumerate(scenarios)]
         total += np.array(scores).reshape(len(candidates), len(group)).mean(axis=1)

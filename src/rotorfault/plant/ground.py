@@ -1,0 +1,118 @@
+r"""Level ground: contact of four feet as unilateral spring-dampers, with friction.
+
+A foot at r_i in the body, :math:`\delta_i` deep in the ground, is pushed up by (Hunt and Crossley 1975)
+
+.. math:: N_i = k\,\max(\delta_i, 0)\,\max(1 + a\dot\delta_i, 0)
+
+It never pulls, is continuous at the touch (damping alone would jump there), takes energy out of every bounce, and
+leaves a foot no more than 1/a on its way up.
+Acting at the feet, these forces also level a tilted vehicle. Friction (Coulomb's law, smooth around rest) brakes the
+point between the feet and the spin about the body z axis:
+
+.. math:: F_t = -\mu N\,\frac{v_t}{\sqrt{v_t^2 + v_s^2}}, \qquad
+          \tau_z = -\mu N\rho_z\,\frac{\rho_z\omega_z}{\sqrt{(\rho_z\omega_z)^2 + v_s^2}}, \quad N = \sum_i N_i
+
+The landing gear is our choice, scaled to the vehicle so that contact stays slow enough for a step of 1 ms on any of
+them: feet at the corners of a square with half side 2 rho, the centre of mass rho above them, rho and rho_z the
+radii of gyration about the horizontal and the vertical axis; springs that sink 2 mm under the weight. The radius
+rho_z as lever of friction is a simplification with the same end. Rotor tips and the air cushion are not modelled.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, final
+
+from rotorfault.geometry import Vec3, euler_matrix
+from rotorfault.scalar import Scalar, maximum, sqrt
+from rotorfault.signals import Measurement
+from rotorfault.vehicle import Vehicle
+
+SAG = 0.002  # m: how far the feet sink under the weight
+DAMPING = 4.0  # s/m: a of Hunt and Crossley; no bounce is faster than 0.25 m/s
+FRICTION = 0.6  # coefficient mu, rubber on concrete or wood
+SLIP_SPEED = 0.05  # m/s: v_s, below which friction grows in proportion to the speed
+FOOT_SPREAD = 2.0  # half side of the square of feet over rho
+LARGEST_STEP = 0.005  # s: integration step up to which contact is stable with room to spare
+
+
+class GroundParameters(NamedTuple):
+    """Numbers of ground and landing gear."""
+
+    height: Scalar  # m: of the centre of mass when all feet just touch
+    leg: Scalar  # m: of the centre of mass above the feet
+    spread: Scalar  # m: of the feet from the centre of mass, along body x and along body y
+    stiffness: Scalar  # N/m, per foot
+    damping: Scalar  # s/m
+    friction: Scalar  # 1
+    slip_speed: Scalar  # m/s
+    yaw_lever: Scalar  # m, rho_z
+
+
+class Contact(NamedTuple):
+    """What the ground does to the vehicle."""
+
+    force_W: Vec3  # N
+    torque_B: Vec3  # N m
+    normal: Scalar  # N, vertical part of the force
+
+
+@final
+class Ground:
+    """Level ground under a vehicle with four feet.
+
+    Parameters
+    ----------
+    height : float
+        Of the centre of mass with all feet just touching, in m.
+    """
+
+    def __init__(self, height: float) -> None:
+        self.height = height
+
+    def parameters(self, vehicle: Vehicle) -> GroundParameters:
+        """Numbers for a vehicle."""
+        J = vehicle.inertia
+        radius = sqrt(0.5 * (J.x + J.y) / vehicle.mass)
+        return GroundParameters(
+            height=self.height,
+            leg=radius,
+            spread=FOOT_SPREAD * radius,
+            stiffness=vehicle.mass * vehicle.gravity / (4.0 * SAG),
+            damping=DAMPING,
+            friction=FRICTION,
+            slip_speed=SLIP_SPEED,
+            yaw_lever=sqrt(J.z / vehicle.mass),
+        )
+
+    def contact(self, measurement: Measurement, parameters: GroundParameters) -> Contact:
+        """Force and torque on the vehicle.
+
+        Parameters
+        ----------
+        measurement : Measurement
+            The true one.
+        parameters : GroundParameters
+        """
+        p, v_W, omega_B = parameters, measurement.v_W, measurement.omega_B
+        R_WB = euler_matrix(measurement.attitude)
+        up_B = Vec3(R_WB.zx, R_WB.zy, R_WB.zz)
+        clearance = measurement.p_W.z - (p.height - p.leg)
+        normal: Scalar = 0.0
+        lever_B = Vec3(0.0, 0.0, 0.0)  # sum of N_i r_i
+        for x, y in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+            foot_B = Vec3(x * p.spread, y * p.spread, -p.leg)
+            depth = -(clearance + up_B.dot(foot_B))
+            sinking = -(v_W.z + up_B.dot(omega_B.cross(foot_B)))
+            force = p.stiffness * maximum(depth, 0.0) * maximum(1.0 + p.damping * sinking, 0.0)
+            normal = normal + force
+            lever_B = lever_B + foot_B * force
+
+        below_B = Vec3(0.0, 0.0, -p.leg)
+        slip_W = v_W + R_WB @ omega_B.cross(below_B)
+        speed = sqrt(slip_W.x * slip_W.x + slip_W.y * slip_W.y + p.slip_speed * p.slip_speed)
+        brake = p.friction * normal / speed
+        friction_W = Vec3(-brake * slip_W.x, -brake * slip_W.y, 0.0)
+        spin = p.yaw_lever * omega_B.z
+        twist = p.friction * normal * p.yaw_lever * spin / sqrt(spin * spin + p.slip_speed * p.slip_speed)
+        torque_B = lever_B.cross(up_B) + below_B.cross(R_WB.T @ friction_W) - Vec3(0.0, 0.0, twist)
+        return Contact(friction_W + Vec3(0.0, 0.0, normal), torque_B, normal)

@@ -1,0 +1,117 @@
+"""The rotor layout of a vehicle seen from above, drawn from its file: arms, rotors, directions, axes, lengths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, FancyArrowPatch
+
+from rotorfault.report.panels import sample
+from rotorfault.report.style import BLACK, BLUE, GREY, VERMILION, Array, new_figure
+from rotorfault.vehicle_file import VehicleFile
+
+# By the sign of the yaw torque. Drag turns the body against the rotor, so "+" is a rotor that turns clockwise.
+LOOKS = {
+    "+": (BLUE, "turns clockwise, yaw torque +"),
+    "-": (VERMILION, "turns counter-clockwise, yaw torque −"),
+}
+DISC = 0.27  # radius of a disc over the least distance of two rotors; the file does not say it
+SAME = 1e-3  # relative difference up to which two arms count as equally long
+OFF = 1.25  # distance of a length from its arm, over the radius of a disc
+
+
+def layout_figure(vehicle: VehicleFile) -> Figure:
+    """The layout of any vehicle, to scale, forward up and left on the left.
+
+    Each rotor has its number, and an arrow for the way it turns; the discs' size is not to scale. The body axes
+    start at the centre of mass, z towards the reader. One length is given per pair of arms that differ.
+    """
+    figure = new_figure(10.5)
+    axes = figure.add_subplot()
+    # On the page, left is left: y runs to the left.
+    places = np.array([(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor])
+    arms = np.hypot(*places.T)
+    largest = float(arms.max())
+    apart = min(math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :])
+    radius = DISC * apart
+    for first, second in ((0, 1), (2, 3)):
+        axes.plot(*places[[first, second], ::-1].T, color="0.8", linewidth=5.0, solid_capstyle="round", zorder=1)
+    for number, (rotor, place) in enumerate(zip(vehicle.rotor, places, strict=True), start=1):
+        _draw_rotor(axes, number, rotor.yaw, place, radius)
+    _draw_axes(axes, largest, radius)
+    # Rotors 2 and 3 lie where the body axes are not.
+    pairs = (1,) if abs(arms[1] - arms[2]) <= SAME * largest else (1, 2)
+    for k in pairs:
+        _draw_length(axes, places[k], OFF * radius)
+    reach = np.abs(places).max(axis=0) + 1.45 * radius
+    axes.set(xlim=(reach[1] * 1.15, -reach[1] * 1.15), ylim=(-reach[0], reach[0]), aspect="equal")
+    axes.set_xlabel("y, left (m)")
+    axes.set_ylabel("x, forward (m)")
+    signs = dict.fromkeys(rotor.yaw for rotor in vehicle.rotor)
+    figure.legend(
+        handles=[sample(LOOKS[sign][1], color=LOOKS[sign][0], linewidth=1.6) for sign in signs],
+        loc="outside upper center",
+        ncols=2,
+    )
+    return figure
+
+
+def _draw_rotor(axes: Axes, number: int, sign: str, place: Array, radius: float) -> None:
+    colour = LOOKS[sign][0]
+    x, y = float(place[0]), float(place[1])
+    axes.add_patch(Circle((y, x), radius, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2))
+    axes.text(y, x, str(number), ha="center", va="center", fontsize=12.0, color=BLACK, zorder=4)
+    # Two open arcs inside the disc, each with a head; angles count from forward towards the left.
+    for start in (0.25 * math.pi, 1.25 * math.pi):
+        sweep = np.linspace(0.0, 0.6 * math.pi, 25) * (-1.0 if sign == "+" else 1.0) + start
+        arc = np.column_stack([y + 0.72 * radius * np.sin(sweep), x + 0.72 * radius * np.cos(sweep)])
+        axes.plot(*arc.T, color=colour, linewidth=1.3, zorder=3)
+        head = FancyArrowPatch(
+            (arc[-3, 0], arc[-3, 1]),
+            (arc[-1, 0], arc[-1, 1]),
+            arrowstyle="-|>",
+            mutation_scale=9.0,
+            color=colour,
+            linewidth=0.0,
+            shrinkA=0.0,
+            shrinkB=0.0,
+            zorder=3,
+        )
+        axes.add_patch(head)
+
+
+def _draw_axes(axes: Axes, largest: float, radius: float) -> None:
+    """Body axes at the centre of mass: x forward, y left, z towards the reader."""
+    length = 0.42 * largest
+    for tip in ((0.0, length), (length, 0.0)):
+        arrow = FancyArrowPatch(
+            (0.0, 0.0), tip, arrowstyle="-|>", mutation_scale=11.0, color=BLACK, linewidth=1.4, shrinkA=0, shrinkB=0
+        )
+        axes.add_patch(arrow).set_zorder(5)
+    off = 0.095 * largest
+    # Beside the tips, on the side away from each other's arrow; y is larger on the left.
+    axes.text(-off, length - 0.3 * off, "$x_B$", ha="center", va="center", zorder=5)
+    axes.text(length - 0.3 * off, -off, "$y_B$", ha="center", va="center", zorder=5)
+    axes.add_patch(Circle((0.0, 0.0), 0.042 * largest, facecolor="white", edgecolor=BLACK, linewidth=1.2, zorder=6))
+    axes.plot(0.0, 0.0, marker=".", markersize=4.0, color=BLACK, zorder=7)
+    axes.text(-off, off, "$z_B$", ha="center", va="center", zorder=5)
+
+
+def _draw_length(axes: Axes, place: Array, off: float) -> None:
+    """A dimension line beside the arm from the centre of mass to a rotor."""
+    arm = float(np.hypot(*place))
+    along = np.array([place[1], place[0]]) / arm  # as drawn: y across, x up
+    aside = off * np.array([along[1], -along[0]])
+    aside = aside if aside @ [-1.0, -0.5] > 0.0 else -aside  # on the page right or below; the body axes point away
+    start, end = aside, along * arm + aside
+    look = {"arrowstyle": "<|-|>", "color": GREY, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (float(end[0]), float(end[1])), (float(start[0]), float(start[1])), arrowprops=look)
+    for tip in (start, end):
+        axes.plot(*np.array([tip - aside, tip + 0.08 * aside]).T, color=GREY, linewidth=0.5, zorder=1.5)
+    middle = along * arm * 0.5 + aside
+    back = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+    text = axes.text(float(middle[0]), float(middle[1]), f"{arm:.3g} m", ha="center", va="center", bbox=back)
+    text.set(color="0.25", zorder=5)

@@ -1,0 +1,109 @@
+"""The report as one HTML page that opens offline: figures inside, tables, claims, readings, versions, times."""
+
+from __future__ import annotations
+
+import base64
+import csv
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from jinja2 import Environment, StrictUndefined
+
+from rotorfault.dataset import versions
+from rotorfault.presets import presets
+from rotorfault.studies.paper import ablation, figures, sensitivity, table1
+from rotorfault.studies.paper.cases import main_runs
+from rotorfault.studies.paper.verdicts import Claim
+from rotorfault.studies.runs import Result
+
+EXTRA_CAPTIONS = {
+    "wind": "Claim 5: settling time and oscillation of case 1 against wind speed.",
+    "ablation": "What each part of the method is worth, case by case.",
+    "sensitivity": "Which conclusions move with what the paper leaves open.",
+}
+
+
+class Page(NamedTuple):
+    """All that the report shows."""
+
+    folder: Path
+    results: Mapping[str, Result]
+    claims: list[Claim]
+    quick: bool
+    seconds: dict[str, float]
+
+
+def render(page: Page) -> str:
+    """The page's HTML."""
+    template = (resources.files("rotorfault.studies.paper") / "report.html.j2").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number"] = _number
+    return environment.from_string(template).render(
+        table=table1.rows(page.results),
+        claims=page.claims,
+        counts=_counts(page.claims),
+        figures=_figures(page, figures.CAPTIONS),
+        extras={name: block[0] for name in EXTRA_CAPTIONS if (block := _figures(page, {name: EXTRA_CAPTIONS[name]}))},
+        flights=_flights(page.results),
+        ablation=[] if page.quick else _rows(page.folder / "ablation.csv"),
+        sensitivity=[] if page.quick else _rows(page.folder / "sensitivity.csv"),
+        findings={}
+        if page.quick
+        else {"ablation": ablation.findings(page.results), "sensitivity": sensitivity.findings(page.results)},
+        records=_records(),
+        versions=versions(),
+        seconds=page.seconds,
+        flying=sum(result.seconds for result in page.results.values()),
+        count=len(page.results),
+    )
+
+
+def _counts(claims: list[Claim]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for claim in claims:
+        kind = "confirmed under a reading" if claim.verdict.startswith("confirmed under") else claim.verdict
+        counts[kind] = counts.get(kind, 0) + 1
+    return counts
+
+
+def _figures(page: Page, captions: Mapping[str, str]) -> list[dict[str, str]]:
+    found = []
+    for name, caption in captions.items():
+        path = page.folder / "figures" / f"{name}.png"
+        if path.is_file():
+            data = base64.b64encode(path.read_bytes()).decode("ascii")
+            title = f"Fig. {int(name[3:])}" if name.startswith("fig") else ""
+            found.append({"name": name, "title": title, "caption": caption, "data": data})
+    return found
+
+
+def _flights(results: Mapping[str, Result]) -> list[dict[str, Any]]:
+    """The main flights, a row each."""
+    rows = []
+    for run in main_runs():
+        if run.id not in results:
+            continue
+        result = results[run.id]
+        rows.append({"id": run.id, "command": run.command, "seconds": result.seconds, **result.summary})
+    return rows
+
+
+def _rows(path: Path) -> list[list[str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
+
+
+def _records() -> list[dict[str, Any]]:
+    """How the presets that were flown were found."""
+    found = []
+    for controller in ("smc", "roismc"):
+        record = presets(controller).get("tuned", {}).get("record")
+        if record:
+            found.append({"controller": controller, **record})
+    return found
+
+
+def _number(value: float | None, digits: int = 4) -> str:
+    return "–" if value is None else f"{value:.{digits}g}"

@@ -1,0 +1,119 @@
+"""Flights that are made up for figures, and checks that every figure must pass."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from itertools import combinations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import FixedLocator
+from matplotlib.transforms import Bbox
+
+from rotorfault.dataset import dataset
+from rotorfault.telemetry import SIGNAL_NAMES
+
+ONSET, THRESHOLD = 1.8, 0.12
+UNIT = re.compile(r"\(.+\)$")
+
+
+def made_up(
+    seed: int = 0, duration: float = 20.0, onset: float = ONSET, drift: float = 0.0, **attributes: object
+) -> xr.Dataset:
+    """A flight to (2, 2, 2) in which rotors 1 and 3 fail; its signals are smooth with noise on top."""
+    time = np.arange(round(duration / 0.01)) * 0.01
+    random = np.random.default_rng(seed)
+    signals = 0.01 * random.standard_normal((len(time), len(SIGNAL_NAMES)))
+
+    def put(name: str, values: object) -> None:
+        signals[:, SIGNAL_NAMES.index(name)] = values
+
+    for axis in "xyz":
+        put(f"position.{axis}", 2.0 - 2.0 * np.exp(-time) + drift * time**2)
+        put(f"position_reference.{axis}", 2.0)
+    for rotor, loss in enumerate((0.25, 0.0, 0.35, 0.0), start=1):
+        put(f"loss_true.r{rotor}", loss * (time >= onset))
+        put(f"loss_estimated.r{rotor}", loss * (1.0 - np.exp(-np.maximum(time - onset, 0.0) / 0.02)))
+        put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
+        put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
+    put("lyapunov", np.exp(-time) + 1e-6)
+    given_too = {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
+    return dataset(signals, time, given_too | attributes)
+
+
+def crashed(at: float = 6.0) -> xr.Dataset:
+    """A flight whose numbers explode before `at` and are NaN from there on, except for what comes from outside."""
+    data = made_up(seed=1, outcome="diverged", end_time=at)
+    time = data["time"].values
+    blow = 1e-3 * np.exp(np.minimum(np.maximum(time - at + 0.1, 0.0) * 300.0, 40.0))
+    for name in data.data_vars:
+        if name not in ("loss_true", "position_reference"):
+            data[name] = data[name] + xr.DataArray(np.where(time < at, blow, np.nan), dims="time")
+    return data
+
+
+def texts(figure: Figure) -> list[tuple[str, Bbox]]:
+    """Labels, titles, notes, offsets, tick labels and the legend as they are laid out."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a layout that was not found
+        figure.draw_without_rendering()
+    found = [(f"legend of {figure}", legend.get_window_extent()) for legend in figure.legends]
+    found += [(text.get_text(), text.get_window_extent()) for text in figure.texts]
+    for axes in figure.axes:
+        parts: list[Text] = [*axes.texts, axes.title]
+        flat = axes.name != "3d"
+        for one_axis in (axes.xaxis, axes.yaxis) if flat else (axes.xaxis, axes.yaxis, axes.zaxis):
+            parts += [one_axis.label, one_axis.get_offset_text()]
+            if flat:
+                low, high = sorted(one_axis.get_view_interval())
+                slack = 0.0 if one_axis.get_scale() == "log" else 1e-6 * (high - low)
+                low, high = low - slack, high + slack
+                parts += [tick.label1 for tick in one_axis.get_major_ticks() if low <= tick.get_loc() <= high]
+        shown = (part for part in parts if part.get_visible() and part.get_text())
+        found += [(part.get_text(), part.get_window_extent()) for part in shown]
+    return found
+
+
+def legend_labels(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def lines_of(axes: Axes, colour: str) -> list[np.ndarray]:
+    return [np.asarray(line.get_xydata()) for line in axes.lines if line.get_color() == colour]
+
+
+def check_units(name: str, figure: Figure) -> None:
+    """Every axis has its unit: below the lowest panel of a column, and beside the first of a row."""
+    assert figure.axes, name
+    for axes in figure.axes:
+        if axes.name == "3d":
+            labels = [axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()]
+            assert labels == ["x (m)", "y (m)", "z (m)"], name
+            continue
+        place = axes.get_subplotspec()
+        if not isinstance(axes.xaxis.get_major_locator(), FixedLocator):  # names of bars have no unit
+            assert bool(UNIT.search(axes.get_xlabel())) == place.is_last_row(), f"{name}: {axes.get_xlabel()!r}"
+        # A detail stands beside a panel of the same quantity, which has the label.
+        beside = [other for other in figure.axes if other.get_subplotspec().rowspan == place.rowspan]
+        before = [o.get_ylabel() for o in beside if o.get_subplotspec().colspan.start <= place.colspan.start]
+        assert any(before), name
+        assert all(UNIT.search(label) for label in before if label), f"{name}: {before}"
+
+
+def check_nothing_covered(name: str, figure: Figure) -> None:
+    """No text leaves the page or lies on another."""
+    found = texts(figure)
+    page = figure.bbox.padded(1.0)
+    assert len(found) >= 4, name
+    for text, box in found:
+        inside = page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1
+        assert inside, f"{name}: {text!r} leaves the page: {box}"
+    for (text, box), (other, there) in combinations(found, 2):
+        # A touch of a point is none: boxes are wider than their letters.
+        shared = Bbox.intersection(box, there)
+        covered = shared is not None and min(shared.width, shared.height) > 2.0
+        assert not covered, f"{name}: {text!r} and {other!r} overlap"
