@@ -14,7 +14,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from rotorfault.dataset import dataset
+from rotorfault.dataset import ATTRIBUTES, dataset
 from rotorfault.telemetry import SIGNAL_NAMES
 
 ONSET, THRESHOLD = 1.8, 0.12
@@ -41,7 +41,8 @@ def made_up(
         put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
         put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
     put("lyapunov", np.exp(-time) + 1e-6)
-    given_too = {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
+    given_too: dict[str, object] = dict.fromkeys(ATTRIBUTES, 0.0)
+    given_too |= {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
     return dataset(signals, time, given_too | attributes)
 
 

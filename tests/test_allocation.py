@@ -28,8 +28,7 @@ from allocation_cases import (
 from hypothesis import given, settings
 from scipy.optimize import linprog, lsq_linear
 
-from rotorfault.allocation.mixer import check_pairs, nominal_inverse, pair_demand, rotor_thrusts
-from rotorfault.errors import InputError
+from rotorfault.allocation.mixer import nominal_inverse, pair_demand, rotor_thrusts
 from rotorfault.geometry import PerRotor, Vec3
 from rotorfault.records import flatten
 from rotorfault.signals import healthy
@@ -62,22 +61,6 @@ def test_paper_s_inverse_is_36_with_the_numbering_of_4() -> None:
         [thrust / 4 - u2 / 2 + u3 / 4, thrust / 4 + u2 / 2 + u3 / 4,
          thrust / 4 - u1 / 2 - u3 / 4, thrust / 4 + u1 / 2 - u3 / 4]
     )  # fmt: skip
-
-
-BAD_LAYOUTS = {
-    "not opposite": ({"rotor_x": PerRotor(0.42, -0.41, 0.0, 0.0)}, "rotors 1 and 2"),
-    "parallel": ({"rotor_x": PerRotor(0.42, -0.42, 0.3, -0.3), "rotor_y": PerRotor.all(0.0)}, "parallel"),
-    "signs": ({"rotor_yaw_sign": PerRotor(1.0, -1.0, 1.0, -1.0)}, "rotor_yaw_sign"),
-    "torque_ratio": ({"torque_ratio": 0.0}, "torque_ratio"),
-    "NaN": ({"rotor_x": PerRotor(math.nan, -0.42, 0.0, 0.0)}, "rotors 1 and 2"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_LAYOUTS)
-def test_layouts_that_the_closed_form_does_not_hold_for_are_refused(case: str) -> None:
-    change, reason = BAD_LAYOUTS[case]
-    with pytest.raises(InputError, match=reason):
-        check_pairs(PAPER._replace(**change))
 
 
 # ----------------------------------------------------------------------------------- what holds for every allocator

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import rotorfault as rf
+from rotorfault import cli
 
 ROOT = Path(__file__).parent.parent
 
@@ -184,6 +185,14 @@ def test_bad_file_is_one_clear_line(what: str, old: str, new: str, named: list[s
     assert_refused(run("check", edited(tmp_path, what, old, new)), named)
 
 
+def test_a_controller_s_file_shadows_no_module(tmp_path: Path) -> None:
+    path = tmp_path / "json.py"
+    path.write_text("class Mine:\n    pass\n")
+    mine = cli._own_controller(f"{path}:Mine")
+    assert sys.modules["json"] is json
+    assert vars(sys.modules[type(mine).__module__])["Mine"] is type(mine)
+
+
 def test_truncated_files_are_refused(tmp_path: Path) -> None:
     path = rf.fly("paper-set-point", settings={"duration": 0.01}).save(tmp_path / "flight.nc")
     whole = path.read_bytes()
@@ -211,7 +220,14 @@ def test_interrupt_leaves_whole_files_or_none(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [sys.executable, "-m", "rotorfault.cli", "fly", "paper-set-point", "--engine", "python", "--no-figures"]
     command += ["--set", "duration=600", "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # A shell that runs the tests in the background lets its children ignore the signal; undone for this child.
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     while process.poll() is None and not out.exists():
         time.sleep(0.05)
     time.sleep(3.0)  # now it flies; whenever the signal hits, the rules below hold

@@ -129,12 +129,12 @@ def test_the_threshold_grows_with_the_spread_of_thrusts() -> None:
     """threshold F + uncertainty s, with s the difference to the partner and half of that between the pairs."""
     thrust = PerRotor(5.0, 3.0, 4.5, 4.0)
     assert list(spread_of(thrust)) == [2.0 + 0.25, 2.0 + 0.25, 0.5 + 0.25, 0.5 + 0.25]
-    edge = 0.12 + 0.25 * 2.25 / 5.0
+    edge = 0.12 + 0.15 * 2.25 / 5.0
     assert not asked_of(edge - 1e-9, 5.0, thrust)
     assert asked_of(edge + 1e-9, 5.0, thrust)
     # The peak is remembered, and forgotten with its time constant.
     even = PerRotor.all(5.0)
-    later = 0.12 + 0.25 * 2.25 * math.exp(-T / 0.03) / 5.0
+    later = 0.12 + 0.15 * 2.25 * math.exp(-T / 0.03) / 5.0
     assert not asked_of(later - 1e-9, 5.0, even, thrust)
     assert asked_of(later + 1e-9, 5.0, even, thrust)
 

@@ -221,6 +221,17 @@ def test_a_watch_ends_a_batch(engine: str) -> None:
 
 
 @every_engine
+def test_looks_at_the_records_copy_none(engine: str) -> None:
+    """A copy for every look would take time with the square of the flight's length."""
+    looks: list[Array] = []
+
+    scenario = short(duration=0.005 * 2 * CHUNK, sensors="ideal")
+    recording = run(scenario, engine, lambda done, records: bool(looks.append(records)))
+    assert [len(look) for look in looks] == [CHUNK, 2 * CHUNK]
+    assert all(np.shares_memory(look, recording.signals) for look in looks)
+
+
+@every_engine
 def test_an_interrupted_flight_keeps_what_it_has(engine: str) -> None:
     def watch(done: int, records: Array) -> bool:
         raise KeyboardInterrupt

@@ -1,7 +1,10 @@
 """Flights from Python: what a `Flight` gives, saving and loading, repeating, comparing with golden numbers."""
 
+import errno
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -150,3 +153,72 @@ def test_what_differs_in_more_than_numbers_is_refused() -> None:
     b = rf.load_scenario("paper-set-point", {**SHORT, "wind.kind": "none"})
     with pytest.raises(rf.InputError, match="differs from the first in more than numbers"):
         rf.fly_all([a, b])
+
+
+@pytest.mark.parametrize("bad", [{"seed": -1}, {"seed": 1.5}, *({"seed": 1, "spread": s} for s in (0.0, 1.0, -0.1))])
+def test_neighbours_out_of_range_are_refused(bad: dict[str, Any]) -> None:
+    with pytest.raises(rf.InputError, match=r"(seed|spread): got .*; allowed: "):
+        rf.neighbour(rf.load_scenario("paper-set-point", SHORT), **bad)
+
+
+@pytest.mark.parametrize("key", ["fault.7.loss", "duration.x.y", "duration.x"])
+def test_a_wrong_key_from_python_is_told_without_the_command_line(key: str) -> None:
+    with pytest.raises(rf.InputError) as caught:
+        rf.fly("paper-set-point", settings={key: 0.3})
+    assert str(caught.value).startswith(f"{key}: ")
+
+
+# ------------------------------------------------------------------------------------------------------------- files
+
+
+def test_a_full_disk_leaves_nothing(short: rf.Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 itself must not write the file: on a full disk it ends the process."""
+
+    def full(self: Path, data: object) -> int:
+        self.touch()
+        raise OSError(errno.ENOSPC, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        short.save(tmp_path / "flight.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("method", ["save", "to_csv"])
+def test_a_missing_folder_is_told(short: rf.Flight, method: str, tmp_path: Path) -> None:
+    with pytest.raises(rf.InputError, match=r"there is no folder .*nowhere; make it") as caught:
+        getattr(short, method)(tmp_path / "nowhere" / "flight.out")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_lacks_something_is_refused(short: rf.Flight, tmp_path: Path) -> None:
+    path = tmp_path / "flight.nc"
+    rf.Flight(short.data.drop_vars("lyapunov"), short.outcome).save(path)
+    with pytest.raises(rf.InputError, match=r"flight\.nc: signal 'lyapunov' is missing"):
+        rf.load(path)
+    without = short.data.copy()
+    del without.attrs["outcome"]
+    rf.Flight(without, short.outcome).save(path)
+    with pytest.raises(rf.InputError, match=r"flight\.nc: attribute 'outcome' is missing"):
+        rf.load(path)
+
+
+def test_a_flight_along_a_table_is_repeated_without_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table is longer than the 64 KiB that HDF5 holds in a plain attribute."""
+    table = tmp_path / "way.csv"
+    rows = [f"{k * 1e-3:.3f},{math.sin(k * 1e-3):.15f},0,{0.1 + k * 1e-5:.15f}" for k in range(3000)]
+    table.write_text("\n".join(["t,x,y,z", *rows]) + "\n")
+    monkeypatch.chdir(tmp_path)
+    settings = {**SHORT, "reference": {"kind": "csv", "file": "way.csv"}}
+    flight = rf.fly("paper-set-point", settings=settings)
+    path = flight.save(tmp_path / "flight.nc")
+    table.unlink()
+    monkeypatch.chdir("/")
+    again = rf.repeat(path)
+    assert again.data.equals(flight.data)
+    # Another file given later is read, whatever the scenario held before.
+    other = tmp_path / "other.csv"
+    other.write_text("t,x,y,z\n0,5,0,0\n1,5,0,0\n")
+    assert flight.scenario is not None
+    moved = rf.fly(flight.scenario, settings={"reference.file": str(other)})
+    assert moved.data["position_reference"].values[0, 0] == 5.0

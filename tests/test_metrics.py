@@ -214,6 +214,23 @@ def test_a_detection_is_dated_from_the_true_loss() -> None:
     assert metrics.false_alarms(data) == 0
 
 
+def test_a_flag_that_was_up_before_the_fault_detects_nothing() -> None:
+    data = flight(TIME, loss_true=at(2.0, 1, 0.25), fault_flag=at(1.0, 1, 1.0))
+    (found,) = metrics.detections(data)
+    assert found["detected_time"] is found["delay"] is None
+    assert metrics.false_alarms(data) == 1
+    # Down and up again after the fault, it has detected it.
+    data = flight(TIME, loss_true=at(2.0, 1, 0.25), fault_flag=at(1.0, 1, 1.0, 2.5) + at(3.0, 1, 1.0))
+    (found,) = metrics.detections(data)
+    assert found["delay"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("onset", [0.0, 2.0])
+def test_a_flag_in_the_record_of_the_fault_detects_it_at_once(onset: float) -> None:
+    (found,) = metrics.detections(flight(TIME, loss_true=at(onset, 1, 0.25), fault_flag=at(onset, 1, 1.0)))
+    assert found["delay"] == 0.0
+
+
 def test_the_estimate_is_read_150_ms_after_the_onset() -> None:
     time = np.arange(400) * 1e-3
     true, believed = np.zeros((400, 4)), np.zeros((400, 4))
@@ -253,7 +270,9 @@ def test_summary_of_simple_signals() -> None:
     found = summarised(
         position=half,
         attitude=steps((100, [0.0, 0.0, 0.0]), (1, [0.3, 0.4, 0.0])),
-        lyapunov=np.concatenate([np.linspace(1.0, 2.0, 26), np.linspace(2.0, 0.0, 75)])[:, None],
+        sigma_position=np.concatenate([np.linspace(-1.0, -2.0, 26), np.linspace(-2.0, 0.0, 75)])[:, None]
+        * [1.0, 0.0, 0.0],
+        outside_layer_position=steps((51, [1.0, 0.0, 0.0]), (50, [0.0, 0.0, 0.0])),
         given_up=steps((100, [0.0, 0.0, 1.0]), (1, [1.0, 0.0, 0.0])),
         riccati_residual=np.linspace(0.0, 1e-3, 101)[:, None],
         riccati_guarded=np.where(TIME < 0.45, 1.0, 0.0)[:, None],
@@ -265,7 +284,9 @@ def test_summary_of_simple_signals() -> None:
     assert found["attitude_max"] == pytest.approx({"roll": 0.3, "pitch": 0.4, "yaw": 0.0})
     assert found["attitude_end"] == pytest.approx({"roll": 0.3, "pitch": 0.4, "yaw": 0.0})
     assert found["attitude_mse"]["roll"] == pytest.approx(0.09 / 101)
-    assert found["lyapunov_rising_fraction"] == pytest.approx(0.25)
+    assert found["outside_layer_fraction"] == pytest.approx(51 / 101)
+    # Of the 50 steps outside the layer the first 25 rise; what happens inside it does not count.
+    assert found["lyapunov_violations"] == pytest.approx(0.5)
     assert found["given_up_fraction"] == pytest.approx({"tilt": 1 / 101, "thrust": 0.0, "yaw": 100 / 101})
     assert found["largest_riccati_residual"] == pytest.approx(1e-3)
     assert found["riccati_guarded_fraction"] == pytest.approx(5 / 101)
@@ -277,6 +298,7 @@ def test_a_lost_flight_has_no_settling_time() -> None:
     found = summarised("tumbled")
     assert found["settle_time"] == dict.fromkeys((*AXES, "overall"))
     assert found["survived"] is False
+    assert found["lyapunov_violations"] is None  # never outside the layer
     assert summarised("settled")["settle_time"]["overall"] == 0.0
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import typer
+from figure_checks import check_nothing_covered
 from matplotlib.text import Text
 
 import rotorfault as rf
@@ -295,18 +296,7 @@ def test_cost_readings_need_no_flights_of_their_own() -> None:
 
 @pytest.mark.parametrize("draw", [ablation.figure, sensitivity.figure, wind_sweep.fig_wind])
 def test_figures_have_no_overlapping_text(results: dict[str, Result], draw: Any) -> None:
-    figure = draw(results)
-    figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
-    texts = [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip()]
-    boxes = [(t.get_text(), t.get_window_extent(renderer)) for t in texts]
-    overlapping = [
-        (a, b)
-        for i, (a, first) in enumerate(boxes)
-        for b, second in boxes[i + 1 :]
-        if first.shrunk(0.9, 0.8).overlaps(second.shrunk(0.9, 0.8)) and a != b
-    ]
-    assert not overlapping
+    check_nothing_covered(draw.__name__, draw(results))
 
 
 # ------------------------------------------------------------------------------------------------ vehicle overrides

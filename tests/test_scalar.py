@@ -13,7 +13,7 @@ from rotorfault import scalar
 
 NAN, INF = math.nan, math.inf
 
-ONE = ("sqrt", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "square", "wrap_angle")
+ONE = ("sqrt", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "wrap_angle")
 TWO = ("atan2", "minimum", "maximum")
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal")
 CONDITIONS_2 = ("both", "either")
@@ -30,7 +30,6 @@ EXPECTED: dict[str, Callable[..., float]] = {
     "absolute": abs,
     "sign": lambda x: float(np.sign(x)),
     "saturate": lambda x: min(max(x, -1.0), 1.0),
-    "square": lambda x: x * x,
     "wrap_angle": lambda x: math.remainder(x, 2 * math.pi),
     "atan2": math.atan2,
     "minimum": min,

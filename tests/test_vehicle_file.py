@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.allocation.mixer import check_pairs
 from rotorfault.config import parse_toml, validate
 from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor, Vec3
@@ -32,7 +31,6 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     assert 1.5 < file.thrust_to_weight < 4.0
     assert len(dict(file.quantities())) == 13 + 8
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
-    check_pairs(file.vehicle)
 
 
 def test_the_paper_s_numbers() -> None:
@@ -137,6 +135,7 @@ BAD = {
     "triangle": (changed("inertia_z = { value = 0.018", "inertia_z = { value = 0.0201"), "inertia_z", "sum.*0.02"),
     "too weak": (changed("thrust_max = { value = 5.5", "thrust_max = { value = 2.4"), "thrust_max", "0.979.*2.45"),
     "limits swapped": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 5.6"), "thrust_min", "less"),
+    "no descent": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 2.46"), "thrust_min", "2.453 N"),
     "unknown key": (changed("mass =", "masss ="), "masss", "unknown key; did you mean 'mass'"),
     "missing key": (re.sub("^gravity = .*", "", GOOD, flags=re.M), "gravity", "missing"),
     "three rotors": (GOOD[: GOOD.rindex("[[rotor]]")], "rotor", "got 3 tables"),

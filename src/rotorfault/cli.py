@@ -117,11 +117,13 @@ def _own_controller(place: str) -> Any:
     path = Path(file)
     if not path.is_file():
         raise InputError(f"--controller {place}: no such file {path}; allowed: FILE.py:NAME")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    # A name of our own: a user's json.py must not stand in for the library's.
+    module_name = f"rotorfault_own_controller_{path.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None:
         raise InputError(f"--controller {place}: {path} is no Python module")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[path.stem] = module
+    sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
         if not hasattr(module, name):

@@ -144,6 +144,8 @@ def signals(truth: Truth, command: Command, report: AutopilotReport) -> Signals:
         virtual_attitude=law.virtual_attitude,
         sigma_position=law.sigma_position,
         sigma_attitude=law.sigma_attitude,
+        outside_layer_position=law.outside_position,
+        outside_layer_attitude=law.outside_attitude,
         lyapunov=law.lyapunov,
         gain_position=law.gain_position,
         gain_velocity=law.gain_velocity,

@@ -6,6 +6,7 @@ that a flight can be repeated from its file alone.
 
 from __future__ import annotations
 
+import io
 import json
 import platform
 from importlib import metadata
@@ -18,7 +19,7 @@ import xarray as xr
 from rotorfault._version import __version__
 from rotorfault.engine.batch import Array
 from rotorfault.errors import InputError
-from rotorfault.files import write_atomically
+from rotorfault.files import in_folder, write_atomically
 from rotorfault.geometry import Mat3, PerRotor, Vec3
 from rotorfault.telemetry import RPY, quantities
 
@@ -26,6 +27,10 @@ AXES = ["x", "y", "z"]
 ANGLES = ["roll", "pitch", "yaw"]
 _LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "heyoka")
 FORMAT = "rotorfault-flight-1"
+ATTRIBUTES = (
+    "scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "thrust_min", "thrust_max",
+)  # fmt: skip
+"""Attributes that the summary of a flight needs."""
 
 
 def dataset(signals: Array, times: Array, attributes: dict[str, Any]) -> xr.Dataset:
@@ -82,9 +87,20 @@ def versions() -> dict[str, str]:
 
 
 def write_netcdf(data: xr.Dataset, path: Path) -> None:
-    """Write a dataset, compressed, whole or not at all."""
+    """Write a dataset, compressed, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist.
+    OSError
+        If the file cannot be written, as on a full disk; nothing is left behind.
+    """
     encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in data.data_vars}
-    write_atomically(path, lambda temporary: data.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
+    # Into memory first: on a full disk HDF5 does not raise but ends the process, and leaves half a file behind.
+    memory = io.BytesIO()
+    data.to_netcdf(memory, engine="h5netcdf", encoding=encoding)
+    write_atomically(in_folder(path), lambda temporary: temporary.write_bytes(memory.getbuffer()))
 
 
 def read_netcdf(path: str | Path) -> xr.Dataset:
@@ -107,6 +123,24 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         raise InputError(f"{path}: cannot be read as a flight ({reason}); fly it again") from None
     if data.attrs.get("format") != FORMAT:
         raise InputError(f"{path}: attribute 'format' is {data.attrs.get('format')!r}; allowed: '{FORMAT}'")
+    return data
+
+
+def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
+    """The same dataset, if it has all signals and attributes that the numbers of a flight are computed from.
+
+    Raises
+    ------
+    InputError
+        If one is missing.
+    """
+    hint = "fly it again with 'rotorfault fly --repeat'"
+    for name in quantities():
+        if name not in data.data_vars:
+            raise InputError(f"{path}: signal '{name}' is missing; {hint}")
+    for name in ATTRIBUTES:
+        if name not in data.attrs:
+            raise InputError(f"{path}: attribute '{name}' is missing; {hint}")
     return data
 
 

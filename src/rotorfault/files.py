@@ -40,6 +40,19 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         raise
 
 
+def in_folder(path: Path) -> Path:
+    """The same path, if the folder that it lies in exists.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+    return path
+
+
 def output_folder(path: Path) -> Path:
     """Make a folder for results and see that it can be written, before anything is computed.
 

@@ -19,7 +19,7 @@ from rotorfault.control.python_controller import as_controller
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Array, Batch, Recording
 from rotorfault.errors import InputError
-from rotorfault.files import output_folder, write_atomically
+from rotorfault.files import in_folder, output_folder, write_atomically
 from rotorfault.metrics import Outcome, finite_or_none, first_loss, judge, summary
 from rotorfault.progress import Bar
 from rotorfault.report.text import summary_text
@@ -72,8 +72,14 @@ class Flight:
         return _figures().draw(self.data)  # type: ignore[no-any-return]
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write all signals as one table, a row per record and a column per component."""
-        path = Path(path)
+        """Write all signals as one table, a row per record and a column per component.
+
+        Raises
+        ------
+        InputError
+            If the folder does not exist.
+        """
+        path = in_folder(Path(path))
         columns = {"time": self.data["time"].values}
         for name, variable in self.data.data_vars.items():
             flat = variable.values.reshape(len(columns["time"]), -1)
@@ -96,7 +102,13 @@ class Flight:
         return path
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight as NetCDF, with its whole configuration."""
+        """Write the flight as NetCDF, with its whole configuration.
+
+        Raises
+        ------
+        InputError
+            If the folder does not exist.
+        """
         dataset.write_netcdf(self.data, Path(path))
         return Path(path)
 
@@ -233,9 +245,9 @@ def load(path: str | Path) -> Flight:
     Raises
     ------
     InputError
-        If the file is missing, truncated or no flight.
+        If the file is missing, truncated or no flight, or lacks a signal.
     """
-    data = dataset.read_netcdf(path)
+    data = dataset.complete(dataset.read_netcdf(path), path)
     return Flight(data, Outcome(str(data.attrs["outcome"]), float(data.attrs["end_time"])))
 
 

@@ -18,8 +18,9 @@ Every number is computed from the records of the flight alone, by the definition
   are of the time in the air.
 - *Landing*: ``speed`` (downwards), ``horizontal_speed`` and ``tilt`` in the last record in the air, ``distance``
   horizontally from where the fault struck to where it touched down.
-- *Detection* of a rotor: from its first true loss to the first flag. ``loss_estimated`` is the believed loss read
-  150 ms after the onset, ``loss_error`` its largest error from then on.
+- *Detection* of a rotor: from its first true loss to the first time from then on that its flag rises; None where it
+  was up before and stays so, a false alarm. ``loss_estimated`` is the believed loss read 150 ms
+  after the onset, ``loss_error`` its largest error from then on.
 """
 
 from __future__ import annotations
@@ -179,7 +180,8 @@ def detections(data: xr.Dataset) -> list[dict[str, Any]]:
         if not len(hit):
             continue
         onset = int(hit[0])
-        flags = np.flatnonzero(data["fault_flag"].values[onset:, i] > 0.5)
+        # A flag that was up before the fault says nothing about it: it was a false alarm.
+        flags = np.flatnonzero(_raised(data)[onset:, i])
         detected = float(time[onset + flags[0]]) if len(flags) else None
         read = np.flatnonzero(time >= time[onset] + READ_AFTER - 1e-9)
         believed = data["loss_believed"].values[:, i]
@@ -199,9 +201,13 @@ def detections(data: xr.Dataset) -> list[dict[str, Any]]:
 
 def false_alarms(data: xr.Dataset) -> int:
     """How often a rotor was flagged that had lost nothing at that time."""
-    flags, true = data["fault_flag"].values > 0.5, data["loss_true"].values
-    raised = flags & ~np.vstack([np.zeros((1, 4), dtype=bool), flags[:-1]])
-    return int(np.sum(raised & (true == 0.0)))
+    return int(np.sum(_raised(data) & (data["loss_true"].values == 0.0)))
+
+
+def _raised(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Whether the flag of each rotor rises in each record, shape (records, 4)."""
+    flags = data["fault_flag"].values > 0.5
+    return np.asarray(flags & ~np.vstack([np.zeros((1, 4), dtype=bool), flags[:-1]]))
 
 
 def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> dict[str, Any]:
@@ -225,7 +231,6 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
     tolerance = 1e-9 * max(1.0, limits[1])
     saturated = ((command <= limits[0] + tolerance) | (command >= limits[1] - tolerance)).any(axis=1)
     nobody: dict[str, float | None] = dict.fromkeys((*_AXES, "overall"))
-    V = data["lyapunov"].values
     return {
         "outcome": outcome.kind,
         "survived": outcome.survived,
@@ -241,7 +246,8 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
         "attitude_max": _per(_ANGLES, np.abs(attitude).max(axis=0)),
         "control_total_variation": float(np.abs(np.diff(command, axis=0)).sum()),
         "saturated_fraction": float(saturated.mean()),
-        "lyapunov_rising_fraction": float(np.mean(np.diff(V) > 0.0)) if len(V) > 1 else 0.0,
+        "outside_layer_fraction": float(np.mean(_outside(data).any(axis=1))),
+        "lyapunov_violations": lyapunov_violations(data),
         "given_up_fraction": _per(("tilt", "thrust", "yaw"), np.mean(data["given_up"].values > 0.5, axis=0)),
         "detections": detections(data),
         "false_alarms": false_alarms(data),
@@ -253,6 +259,25 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
 
 def _per(names: tuple[str, ...], values: NDArray[np.float64]) -> dict[str, float]:
     return {name: float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _outside(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which of the six axes are outside their boundary layer, shape (records, 6)."""
+    parts = [data[f"outside_layer_{group}"].values > 0.5 for group in ("position", "attitude")]
+    return np.hstack(parts)
+
+
+def lyapunov_violations(data: xr.Dataset) -> float | None:
+    """Share of the steps of an axis outside its layer in which its sigma^2 / 2 rises; None if there are none.
+
+    In the ideal setting (no lag, no limits, bounded disturbance, continuous time) it would be 0: (27)-(29).
+    """
+    outside = _outside(data)
+    sigma = np.hstack([data[f"sigma_{group}"].values for group in ("position", "attitude")])
+    counted = outside[1:] & outside[:-1]
+    if not counted.any():
+        return None
+    return float(np.mean((np.diff(np.abs(sigma), axis=0) > 0.0)[counted]))
 
 
 def finite_or_none(value: Any) -> Any:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorfault.errors import InputError
 from rotorfault.scenario import Mismatch, Part, Scenario, Start
 
 
@@ -19,10 +20,10 @@ def neighbour(
     ----------
     scenario : Scenario
     seed : int
-        Names the draw; the same seed gives the same neighbour.
+        0 or greater. Names the draw; the same seed gives the same neighbour.
     spread : float
-        True mass, principal moments of inertia and drag, and each initial position, attitude and rate, are
-        multiplied by factors uniform in 1 -+ spread, independently.
+        Between 0 and 1, both excluded. True mass, principal moments of inertia and drag, and each initial
+        position, attitude and rate, are multiplied by factors uniform in 1 -+ spread, independently.
     onset : (2,) float
         All faults that set in at a time are moved to a common one, uniform in this interval [s].
 
@@ -30,7 +31,16 @@ def neighbour(
     -------
     Scenario
         Same parts, same length: it may fly in one batch with the original.
+
+    Raises
+    ------
+    InputError
+        If `seed` or `spread` is out of its range.
     """
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed: got {seed!r}; allowed: a whole number, 0 or greater")
+    if not 0.0 < spread < 1.0:
+        raise InputError(f"spread: got {spread!r}; allowed: between 0 and 1, both excluded")
     # The second word keeps this stream apart from the sensor noise of the same seed.
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 1 << 40])))
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_serializer, model_validator
 
-from rotorfault.config import Strict, refusal
+from rotorfault.config import Strict, read_text, refusal
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
 from rotorfault.records import flatten
@@ -248,10 +248,24 @@ class Csv:
             description="CSV file with the columns t [s], x, y, z [m] and, if there, yaw [rad], vx, vy, vz [m/s], "
             "ax, ay, az [m/s^2], yaw_rate [rad/s]",
         )
+        text: str | None = Field(
+            default=None, description="What the file says; read from it if not given, and kept with every flight"
+        )
+
+        @model_validator(mode="before")
+        @classmethod
+        def _with_text(cls, data: Any) -> Any:
+            # Read once, here: what is flown, saved and repeated is then the same, whatever becomes of the file.
+            if not isinstance(data, dict) or data.get("text") is not None or not isinstance(data.get("file"), str):
+                return data
+            try:
+                return {**data, "text": read_text(data["file"])} if data["file"] else data
+            except InputError as error:
+                raise refusal("file", str(error)) from None
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        columns = read_table(settings.file)
+        columns = read_table(settings.text or "", settings.file)
         self._axes = [
             Curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
             for axis, rate, acceleration in (("x", "vx", "ax"), ("y", "vy", "ay"), ("z", "vz", "az"))

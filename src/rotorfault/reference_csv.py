@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicSpline
 
-from rotorfault.config import read_text
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
 
@@ -23,8 +22,8 @@ GROUPS = (("vx", "vy", "vz"), ("ax", "ay", "az"))
 """Columns that only come together."""
 
 
-def read_table(path: str | Path) -> dict[str, Array]:
-    """Columns of a CSV file with a header line.
+def read_table(text: str, path: str | Path) -> dict[str, Array]:
+    """Columns of a CSV table with a header line, that was read from `path`.
 
     Returns
     -------
@@ -34,10 +33,10 @@ def read_table(path: str | Path) -> dict[str, Array]:
     Raises
     ------
     InputError
-        If the file cannot be read; a column is missing, unknown or twice there; a row has too few or too many
+        If a column is missing, unknown or twice there; a row has too few or too many
         values, or one that is no finite number; there are fewer than two rows, or the times do not grow.
     """
-    lines = read_text(path).lstrip("\ufeff").splitlines()
+    lines = text.lstrip("\ufeff").splitlines()
     reader = csv.reader(lines, skipinitialspace=True)
     try:
         rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]

@@ -309,11 +309,6 @@ def saturate(x: Scalar) -> Scalar:
     return f.select(f.less(x, -1.0), -1.0, f.select(f.less(1.0, x), 1.0, x))
 
 
-def square(x: Scalar) -> Scalar:
-    """x times x."""
-    return x * x
-
-
 def wrap_angle(x: Scalar) -> Scalar:
     """The angle equal to x modulo a full turn, in (-pi, pi]."""
     return atan2(sin(x), cos(x))

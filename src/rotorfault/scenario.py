@@ -318,23 +318,24 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
                 inner = here[part] = {} if inner is None else {"kind": inner}
             here = inner
         else:
-            raise InputError(f"--set {key}: '{'.'.join(path[:depth])}' is a single value; it has no key '{part}'")
+            raise InputError(f"{key}: '{'.'.join(path[:depth])}' is a single value; it has no key '{part}'")
     if isinstance(here, list):
         here[_index(here, last, key)] = value
     elif not isinstance(here, dict):
-        raise InputError(f"--set {key}: '{'.'.join(path)}' is a single value; it has no key '{last}'")
+        raise InputError(f"{key}: '{'.'.join(path)}' is a single value; it has no key '{last}'")
     elif last == "kind" and here.get("kind") != value:
         here.clear()
         here["kind"] = value
     else:
+        if key == "reference.file":
+            # The text that a checked scenario holds is that of the former file.
+            here.pop("text", None)
         here[last] = value
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
     if not part.isdigit() or int(part) >= len(items):
-        raise InputError(
-            f"--set {key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}"
-        )
+        raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}")
     return int(part)
 
 

@@ -61,6 +61,8 @@ class Signals(NamedTuple):
     virtual_attitude: Annotated[Vec3, Q("rad/s^2", RPY, "commanded angular acceleration less feed-forward")]
     sigma_position: Annotated[Vec3, Q("m/s", W, "sliding variable, times its weight")]
     sigma_attitude: Annotated[Vec3, Q("rad/s", RPY, "sliding variable, times its weight")]
+    outside_layer_position: Annotated[Vec3, Q("1", W, "1 on axes outside the boundary layer")]
+    outside_layer_attitude: Annotated[Vec3, Q("1", RPY, "1 on axes outside the boundary layer")]
     lyapunov: Annotated[Scalar, Q("1", NO_FRAME, "V = sigma^T sigma / 2 over all six axes")]
     gain_position: Annotated[Vec3, Q("1/s^2", W, "gain on the position error")]
     gain_velocity: Annotated[Vec3, Q("1/s", W, "gain on the velocity error")]

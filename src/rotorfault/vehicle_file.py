@@ -122,10 +122,15 @@ class VehicleFile(Strict):
         if not low < high:
             return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
         ratio = self.thrust_to_weight
+        hover = self.mass.value * self.gravity.value / (4.0 * self.rotor_gain.value)
         if not ratio > 1.0:
             message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"
-            least = self.mass.value * self.gravity.value / (4.0 * self.rotor_gain.value)
-            return refusal("thrust_max", f"{message} {least:.4g} N per rotor")
+            return refusal("thrust_max", f"{message} {hover:.4g} N per rotor")
+        if not low < hover:
+            return refusal(
+                "thrust_min",
+                f"got {low!r} N: it cannot descend; allowed: less than in hover, {hover:.4g} N per rotor",
+            )
         return None
 
     def _check_pairs(self) -> PydanticCustomError | None:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor
 from rotorfault.scalar import Scalar
 from rotorfault.signals import Wrench
@@ -70,28 +69,3 @@ def rotor_thrusts(pairs: PairDemand) -> PerRotor:
 def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
     """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected."""
     return rotor_thrusts(pair_demand(vehicle, wrench))
-
-
-def check_pairs(vehicle: Vehicle) -> None:
-    """Refuse a vehicle that the closed forms of this package do not hold for; for numbers, at the edge.
-
-    Raises
-    ------
-    InputError
-        If rotor 2 is not opposite rotor 1 or 4 not opposite 3 (to 1e-9 m), if the two arms are parallel, if a yaw
-        sign is not -1 or +1 or the signs are not (s, s, -s, -s), or if torque_ratio or rotor_gain is not positive.
-    """
-    x, y, sign = list(vehicle.rotor_x), list(vehicle.rotor_y), list(vehicle.rotor_yaw_sign)
-    for a, b in ((0, 1), (2, 3)):
-        if not (abs(x[a] + x[b]) <= 1e-9 and abs(y[a] + y[b]) <= 1e-9):
-            raise InputError(
-                f"rotors {a + 1} and {b + 1} are at ({x[a]:g}, {y[a]:g}) and ({x[b]:g}, {y[b]:g}) m; they must be "
-                "opposite each other about the centre of mass: number the rotors so that 1-2 and 3-4 are the arms"
-            )
-    if not abs(x[0] * y[2] - x[2] * y[0]) > 1e-6 * (x[0] ** 2 + y[0] ** 2 + x[2] ** 2 + y[2] ** 2):
-        raise InputError("the arms of rotors 1-2 and 3-4 are parallel; they must cross to give roll and pitch torque")
-    if sign not in ([1, 1, -1, -1], [-1, -1, 1, 1]):
-        raise InputError(f"rotor_yaw_sign is {sign}; allowed are [1, 1, -1, -1] and [-1, -1, 1, 1]")
-    for name in ("torque_ratio", "rotor_gain"):
-        if not getattr(vehicle, name) > 0.0:
-            raise InputError(f"{name} is {getattr(vehicle, name):g}; it must be positive")

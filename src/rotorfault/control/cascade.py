@@ -214,6 +214,8 @@ class Cascade:
             gain_rate=inner.gain_rate,
             riccati_residual=inner.riccati_residual,
             riccati_guarded=inner.riccati_guarded,
+            outside_position=outer.outside,
+            outside_attitude=inner.outside,
         )
         output = ControlOutput(Wrench(thrust, torque_B), direct, telemetry)
         return CascadeMemory(position_memory, attitude_memory, following), output

@@ -31,7 +31,7 @@ from pydantic import Field, field_validator
 from rotorfault.config import Strict, Three
 from rotorfault.control.protocol import TrackingError
 from rotorfault.geometry import Vec3, zeros
-from rotorfault.scalar import Scalar, absolute, exp, saturate, sign, sqrt
+from rotorfault.scalar import Scalar, absolute, exp, greater, saturate, sign, sqrt
 
 Nominal = Literal["achieved", "demanded"]
 Switching = Literal["smooth", "discontinuous"]
@@ -125,6 +125,12 @@ def switching_input(sigma: Vec3, error_norm: Scalar, gains: SwitchingGains, form
         return -reach * (sign(sigma_i) if form == "discontinuous" else saturate(sigma_i / (size * gains.layer)))
 
     return Vec3.of(axis(s, n, k) for s, n, k in zip(sigma, gains.weight, gains.k, strict=True))
+
+
+def outside_layer(sigma: Vec3, gains: SwitchingGains) -> Vec3:
+    """1 on axes whose sliding variable is outside the boundary layer, else 0."""
+    widths = gains.weight.map(absolute) * gains.layer
+    return Vec3.of(greater(absolute(s), width) for s, width in zip(sigma, widths, strict=True))
 
 
 def add_switching(

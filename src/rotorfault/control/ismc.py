@@ -24,6 +24,7 @@ from rotorfault.control.integral_sliding import (
     SwitchingGains,
     SwitchingSettings,
     add_switching,
+    outside_layer,
     start,
 )
 from rotorfault.control.protocol import LawOutput, TrackingError
@@ -135,4 +136,6 @@ class Ismc:
         surface, u, sigma = add_switching(
             memory, error, feedback, gains, self.settings.nominal, self.settings.switching, dt
         )
-        return surface, LawOutput(u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
+        return surface, LawOutput(
+            u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0, outside_layer(sigma, gains)
+        )

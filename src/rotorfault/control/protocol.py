@@ -49,6 +49,8 @@ class ControlTelemetry(NamedTuple):
     gain_rate: Mat3  # 1/s
     riccati_residual: Scalar  # relative residual of (22) for the attitude block
     riccati_guarded: Scalar  # 1 where the guaranteed gain had to be flown
+    outside_position: Vec3 = zeros()  # 1 on axes whose sliding variable is outside the boundary layer
+    outside_attitude: Vec3 = zeros()
 
 
 def no_telemetry() -> ControlTelemetry:
@@ -104,6 +106,7 @@ class LawOutput(NamedTuple):
     gain_rate: Mat3  # 1/s
     riccati_residual: Scalar
     riccati_guarded: Scalar
+    outside: Vec3 = zeros()  # 1 on axes outside the boundary layer
 
 
 class Law(Protocol):

@@ -25,6 +25,7 @@ from rotorfault.control.integral_sliding import (
     SwitchingGains,
     SwitchingSettings,
     add_switching,
+    outside_layer,
     start,
 )
 from rotorfault.control.protocol import LawOutput, TrackingError
@@ -108,7 +109,9 @@ class Roismc:
         nominal = -k1.times(error.e) - k2.times(error.e_dot)
         s = self.settings
         memory, u, sigma = add_switching(memory, error, nominal, parameters.position, s.nominal, s.switching, dt)
-        return memory, LawOutput(u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
+        return memory, LawOutput(
+            u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0, outside_layer(sigma, parameters.position)
+        )
 
     def attitude(
         self, memory: AttitudeMemory, error: TrackingError, parameters: RoismcParameters, dt: Scalar
@@ -122,4 +125,6 @@ class Roismc:
         surface, u, sigma = add_switching(
             memory.surface, error, nominal, parameters.attitude, s.nominal, s.switching, dt
         )
-        return AttitudeMemory(gain, surface), LawOutput(u, sigma, K_angle, K_rate, residual, guarded)
+        return AttitudeMemory(gain, surface), LawOutput(
+            u, sigma, K_angle, K_rate, residual, guarded, outside_layer(sigma, parameters.attitude)
+        )

@@ -26,7 +26,7 @@ from rotorfault.control.riccati import position_gain
 from rotorfault.control.sdre import Weights, position_gains, sdre_parameters
 from rotorfault.errors import InputError
 from rotorfault.geometry import Mat3, Vec3
-from rotorfault.scalar import Scalar, saturate, sign
+from rotorfault.scalar import Scalar, absolute, greater, saturate, sign
 from rotorfault.vehicle import Vehicle
 
 MATCH_AT = 0.1  # m: position error at which bandwidths are compared
@@ -184,4 +184,5 @@ class Smc:
         u = -slope.times(error.e_dot) - reaching.times(s) - K.times(switch)
         # Gains of the linear range, for the record and the linearisation.
         steep = reaching + K / layer if self.settings.switching == "smooth" else reaching
-        return LawOutput(u, s, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), 0.0, 0.0)
+        outside = s.map(lambda s_i: greater(absolute(s_i), layer))
+        return LawOutput(u, s, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), 0.0, 0.0, outside)

@@ -56,7 +56,7 @@ class DecisionSettings(Strict):
 
     threshold: float = Field(default=0.12, gt=0.0, lt=1.0, description="loss above which a rotor is suspected")
     uncertainty: float = Field(
-        default=0.25, ge=0.0, description="share by which torques may be mispredicted, inertia errors first of all"
+        default=0.15, ge=0.0, description="share by which torques may be mispredicted, inertia errors first of all"
     )
     memory: float = Field(default=0.03, gt=0.0, description="time constant of the spread's peak [s]")
     persistence: float = Field(default=0.008, ge=0.0, description="time above the threshold before it is flagged [s]")

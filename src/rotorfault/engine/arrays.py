@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from rotorfault.engine.batch import (
-    Array,
     Batch,
     Recording,
+    Records,
     Watch,
     as_drive,
     columns,
     drive_rows,
     drive_template,
     recorded,
-    recording,
 )
 from rotorfault.records import unflatten
 
@@ -24,8 +23,7 @@ def run(batch: Batch, watch: Watch) -> Recording:
     template = drive_template(batch)
     parameters = unflatten(batch.parameters, list(columns(batch.parameters, batch.flights)))
     state = unflatten(batch.state, list(columns(batch.state, batch.flights)))
-    records: list[Array] = []
-    steps: list[int] = []
+    records = Records(batch)
     try:
         with np.errstate(all="ignore"):  # failure is data: NaN shows in the record
             for first, rows in drive_rows(batch):
@@ -33,10 +31,9 @@ def run(batch: Batch, watch: Watch) -> Recording:
                 for k, row in enumerate(np.broadcast_to(rows, (*rows.shape[:2], batch.flights))):
                     state, signals = batch.loop.step(state, as_drive(unflatten(template, list(row))), parameters)
                     if k in wanted:
-                        records.append(columns(signals, batch.flights))
-                        steps.append(first + k)
-                if watch(first + len(rows), np.stack(records)):
+                        records.add(first + k, columns(signals, batch.flights))
+                if watch(first + len(rows), records.so_far):
                     break
     except KeyboardInterrupt:
-        return recording(records, steps, interrupted=True)
-    return recording(records, steps, interrupted=False)
+        return records.recording(interrupted=True)
+    return records.recording()

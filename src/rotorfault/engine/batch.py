@@ -13,6 +13,7 @@ from rotorfault.geometry import zeros
 from rotorfault.plant.sensors import no_noise
 from rotorfault.records import flatten
 from rotorfault.signals import Reference
+from rotorfault.telemetry import SIGNAL_NAMES
 
 Array = NDArray[np.float64]
 CHUNK = 500  # steps between two looks at progress, noise and early endings
@@ -111,8 +112,31 @@ def recorded(batch: Batch, first: int, length: int) -> list[int]:
     return [k for k in range(length) if (first + k) % batch.every == 0]
 
 
-def recording(records: list[Array], steps: list[int], interrupted: bool) -> Recording:
-    """Collect records taken one by one; KeyboardInterrupt if it came before the first of them."""
-    if not records:
-        raise KeyboardInterrupt
-    return Recording(np.stack(records), np.array(steps[: len(records)], dtype=float), interrupted)
+class Records:
+    """Records taken one by one, in one array that is there from the start.
+
+    To stack them anew for every look would take time with the square of a flight's length. Memory is occupied only
+    as far as it is written.
+    """
+
+    def __init__(self, batch: Batch) -> None:
+        capacity = -(-batch.steps // batch.every)
+        self._signals = np.empty((capacity, len(SIGNAL_NAMES), batch.flights))
+        self._steps = np.empty(capacity)
+        self._filled = 0
+
+    def add(self, step: int, signals: Array) -> None:
+        """Keep the signals of a step, shape (rows of `Signals`, N)."""
+        self._signals[self._filled], self._steps[self._filled] = signals, step
+        self._filled += 1
+
+    @property
+    def so_far(self) -> Array:
+        """The records so far, not copied; shape (records, rows of `Signals`, N)."""
+        return self._signals[: self._filled]
+
+    def recording(self, interrupted: bool = False) -> Recording:
+        """All of them; KeyboardInterrupt if it came before the first."""
+        if self._filled == 0:
+            raise KeyboardInterrupt
+        return Recording(self.so_far, self._steps[: self._filled], interrupted)

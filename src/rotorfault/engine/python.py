@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from rotorfault.engine.batch import (
-    Array,
     Batch,
     Recording,
+    Records,
     Watch,
     as_drive,
     columns,
     drive_rows,
     drive_template,
     recorded,
-    recording,
 )
 from rotorfault.records import flatten, unflatten
 from rotorfault.telemetry import SIGNAL_NAMES, Signals
@@ -31,8 +30,7 @@ def run(batch: Batch, watch: Watch) -> Recording:
     states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.flights)]
     lost = [False] * batch.flights
     missing = [np.nan] * len(SIGNAL_NAMES)
-    records: list[Array] = []
-    steps: list[int] = []
+    records = Records(batch)
     try:
         for first, rows in drive_rows(batch):
             wanted = set(recorded(batch, first, len(rows)))
@@ -49,10 +47,9 @@ def run(batch: Batch, watch: Watch) -> Recording:
                     if k in wanted:
                         taken.append(missing if signals is None else [float(x) for x in flatten(signals)])
                 if k in wanted:
-                    records.append(np.array(taken).T)
-                    steps.append(first + k)
-            if watch(first + len(rows), np.stack(records)):
+                    records.add(first + k, np.array(taken).T)
+            if watch(first + len(rows), records.so_far):
                 break
     except KeyboardInterrupt:
-        return recording(records, steps, interrupted=True)
-    return recording(records, steps, interrupted=False)
+        return records.recording(interrupted=True)
+    return records.recording()

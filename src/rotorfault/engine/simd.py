@@ -9,9 +9,8 @@ from __future__ import annotations
 import heyoka as hy
 import numpy as np
 
-from rotorfault.engine.batch import Array, Batch, Recording, Watch, columns, drive_rows, recorded
+from rotorfault.engine.batch import Array, Batch, Recording, Records, Watch, columns, drive_rows, recorded
 from rotorfault.engine.compiled import stepper
-from rotorfault.telemetry import SIGNAL_NAMES
 
 
 def run(batch: Batch, watch: Watch) -> Recording:
@@ -26,10 +25,7 @@ def run(batch: Batch, watch: Watch) -> Recording:
     loop = stepper(
         batch, widened(columns(batch.state, batch.flights)), widened(columns(batch.parameters, batch.flights))
     )
-    capacity = -(-batch.steps // batch.every)
-    records = np.empty((capacity, len(SIGNAL_NAMES), batch.flights))
-    steps = np.empty(capacity)
-    filled = 0
+    records = Records(batch)
     try:
         for first, rows in drive_rows(batch):
             if rows.shape[2] > 1:
@@ -38,12 +34,9 @@ def run(batch: Batch, watch: Watch) -> Recording:
             for k, row in enumerate(rows):
                 signals = loop.advance(row)
                 if k in wanted:
-                    records[filled], steps[filled] = signals[:, : batch.flights], first + k
-                    filled += 1
-            if watch(first + len(rows), records[:filled]):
+                    records.add(first + k, signals[:, : batch.flights])
+            if watch(first + len(rows), records.so_far):
                 break
     except KeyboardInterrupt:
-        if filled == 0:
-            raise
-        return Recording(records[:filled], steps[:filled], interrupted=True)
-    return Recording(records[:filled], steps[:filled])
+        return records.recording(interrupted=True)
+    return records.recording()
