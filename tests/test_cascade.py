@@ -132,7 +132,7 @@ def attitude_pair(yaw: float, start: tuple[float, float, float], controller: str
             "name": f"from {start} to {yaw}",
             "vehicle": "paper",
             "plant": "rigid_body",
-            "duration": 8.0,
+            "duration": 16.0,  # the slowest tuned yaw loop has a pole at 0.5 rad/s
             "period": 0.002,
             "start": {"attitude": list(start), "body_rates": [1.0, -1.0, 0.5]},
             "reference": {"kind": "set_point", "position": [0.0, 0.0, 0.0], "yaw": yaw},
