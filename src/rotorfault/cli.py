@@ -242,7 +242,11 @@ def paper(
             typer.echo(f"{result.run.id}: {study.line(result)}")
         typer.echo(f"flights are in {out / 'flights'}; the whole paper: rotorfault paper --out {out}")
         return
-    done = study.reproduce(out, quick, workers)
+    try:
+        done = study.reproduce(out, quick, workers)
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; what is done is kept in {out}, start again to go on", err=True)
+        raise typer.Exit(130) from None
     typer.echo(study.text(done))
 
 
