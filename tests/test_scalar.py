@@ -13,7 +13,7 @@ from rotorfault import scalar
 
 NAN, INF = math.nan, math.inf
 
-ONE = ("sqrt", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "wrap_angle")
+ONE = ("sqrt", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "nearest", "wrap_angle")
 TWO = ("atan2", "minimum", "maximum")
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal")
 CONDITIONS_2 = ("both", "either")
@@ -30,6 +30,7 @@ EXPECTED: dict[str, Callable[..., float]] = {
     "absolute": abs,
     "sign": lambda x: float(np.sign(x)),
     "saturate": lambda x: min(max(x, -1.0), 1.0),
+    "nearest": lambda x: float(round(x)),
     "wrap_angle": lambda x: math.remainder(x, 2 * math.pi),
     "atan2": math.atan2,
     "minimum": min,
@@ -55,6 +56,14 @@ def on_arrays(function: Callable[..., Any], rows: np.ndarray) -> np.ndarray:
     return np.asarray(function(*rows.T.copy()))
 
 
+def on_terms(function: Callable[..., Any], rows: np.ndarray) -> np.ndarray:
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine.function import CompiledFunction
+
+    compiled = CompiledFunction(function, *[0.0] * rows.shape[1])
+    return np.asarray(compiled(rows.T.copy())[0])
+
+
 def on_heyoka(function: Callable[..., Any], rows: np.ndarray) -> np.ndarray:
     hy = pytest.importorskip("heyoka")
     symbols = [hy.expression(f"x{i}") for i in range(rows.shape[1])]
@@ -70,7 +79,7 @@ def on_casadi(function: Callable[..., Any], rows: np.ndarray) -> np.ndarray:
 
 
 ENGINES = pytest.mark.parametrize(
-    "engine", [on_floats, on_arrays, on_heyoka, on_casadi], ids=["floats", "arrays", "heyoka", "casadi"]
+    "engine", [on_floats, on_arrays, on_terms, on_heyoka, on_casadi], ids=["floats", "arrays", "terms", "heyoka", "casadi"]
 )
 
 
@@ -81,6 +90,8 @@ def grid(*axes: list[float]) -> np.ndarray:
 def arguments(name: str) -> np.ndarray:
     if name == "clip":
         return grid(NUMBERS, [-1.0, -0.3], [0.3, 2.0])
+    if name == "nearest":
+        return grid([x for x in NUMBERS if x != -3.5])  # of two that are equally near, either will do
     if name == "select":
         return grid([0.0, 1.0], NUMBERS, [7.0, -7.0])
     if name in (*CONDITIONS_2, "negated"):

@@ -18,6 +18,7 @@ from rotorfault.plant.plant import Plant
 from rotorfault.records import flatten, unflatten
 from rotorfault.reference import ReferenceTable
 from rotorfault.scenario import Scenario
+from rotorfault.scoring import AT_LIMIT, SETTLED, TRACKED, ScoringParameters, bands
 from rotorfault.signals import Reference
 
 
@@ -51,12 +52,6 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
         scenario.on_fault.make(),
     )
     loop = ClosedLoop(plant, sensors, autopilot)
-    parameters = LoopParameters(
-        plant=plant.parameters(scenario.mismatch.applied(vehicle)),
-        autopilot=autopilot.parameters(vehicle, scenario.period),
-        sensors=sensors.parameters(),
-        period=scenario.period,
-    )
     times = np.arange(scenario.steps) * scenario.period
     with np.errstate(all="ignore"):
         table = scenario.reference.make().table(times)
@@ -70,6 +65,13 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
     seeds = ((scenario.seed, 0),)
     start = Start(*(Vec3.of(part) for part in _start(scenario)))
     drive = Drive(_first(table), _first_noise(seeds) if sensors.needs_noise else no_noise())
+    parameters = LoopParameters(
+        plant=plant.parameters(scenario.mismatch.applied(vehicle)),
+        autopilot=autopilot.parameters(vehicle, scenario.period),
+        sensors=sensors.parameters(),
+        period=scenario.period,
+        scoring=scoring_parameters(scenario, rows),
+    )
     state = loop.initial(start, drive, parameters)
     return Batch(loop, state, parameters, rows, 1, seeds, scenario.every)
 
@@ -99,6 +101,28 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
         flights=len(batches),
         # Each by its own seed, whatever its place: a flight is the same alone and in any batch.
         seeds=tuple(seed for batch in batches for seed in batch.seeds),
+    )
+
+
+def scoring_parameters(scenario: Scenario, reference: Array) -> ScoringParameters:
+    """What scoring needs to know of a flight.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    reference : ndarray, shape (steps, 12)
+        Rows of `Reference`.
+    """
+    start, vehicle = np.array(scenario.start.position), scenario.vehicle.vehicle
+    margin = AT_LIMIT * max(1.0, vehicle.thrust_max)
+    settle, track = (bands(reference[:, :3], start, share).tolist() for share in (SETTLED, TRACKED))
+    return ScoringParameters(
+        settle_band=Vec3.of(settle),
+        track_band=Vec3.of(track),
+        half=float(len(reference) // 2),
+        command_low=vehicle.thrust_min + margin,
+        command_high=vehicle.thrust_max - margin,
+        ground=0.0 if scenario.ground is None else scenario.ground,
     )
 
 

@@ -3,6 +3,7 @@
     truth       = plant.observe(state)
     measurement = sensors(truth)
     command     = autopilot(measurement, reference)
+    scores      = scoring(scores, signals of this instant)
     state       = plant.step(state, command held for one period)
 
 Time is the counted step times the period, never a sum of periods: a fault at 1.8 s falls on its step exactly.
@@ -18,6 +19,7 @@ from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rotors import true_loss
 from rotorfault.plant.sensors import Normals, Sensors, no_noise
 from rotorfault.scalar import Scalar
+from rotorfault.scoring import Scores, Scoring, ScoringParameters, unjudged
 from rotorfault.signals import Command, Reference
 from rotorfault.telemetry import Signals
 from rotorfault.vehicle import hover_thrust
@@ -30,13 +32,15 @@ class LoopParameters(NamedTuple):
     autopilot: AutopilotParameters
     sensors: Any
     period: Scalar  # s
+    scoring: ScoringParameters = unjudged()
 
 
 class LoopState(NamedTuple):
-    """State of truth and belief, and the number of steps flown."""
+    """State of truth and belief, what has been counted, and the number of steps flown."""
 
     plant: PlantState
     autopilot: AutopilotMemory
+    scores: Scores
     steps: Scalar
 
 
@@ -58,7 +62,7 @@ class Start(NamedTuple):
 
 @final
 class ClosedLoop:
-    """Plant, sensors and autopilot.
+    """Plant, sensors and autopilot, and the scores of their flight.
 
     Parameters
     ----------
@@ -69,25 +73,27 @@ class ClosedLoop:
 
     def __init__(self, plant: Plant, sensors: Sensors, autopilot: Autopilot) -> None:
         self.plant, self.sensors, self.autopilot = plant, sensors, autopilot
+        self.scoring = Scoring(ground=plant.ground is not None)
 
     def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
         plant = self.plant.initial(*start, hover_thrust(parameters.autopilot.vehicle), parameters.plant)
         truth = self.plant.observe(plant, 0.0, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
-        return LoopState(plant, self.autopilot.initial(measurement, drive.reference, parameters.autopilot), 0.0)
+        autopilot = self.autopilot.initial(measurement, drive.reference, parameters.autopilot)
+        return LoopState(plant, autopilot, self.scoring.initial(), 0.0)
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
         """One sampling period: the state after it, and the signals at its beginning."""
-        memory, command, recorded = self.decide(state, drive, parameters)
+        memory, scores, command, recorded = self.decide(state, drive, parameters)
         time = state.steps * parameters.period
         plant = self.plant.step(state.plant, command, time, parameters.plant, parameters.period)
-        return LoopState(plant, memory, state.steps + 1.0), recorded
+        return LoopState(plant, memory, scores, state.steps + 1.0), recorded
 
     def decide(
         self, state: LoopState, drive: Drive, parameters: LoopParameters
-    ) -> tuple[AutopilotMemory, Command, Signals]:
-        """The sampling instant alone: the autopilot's memory after it, its command, and the signals."""
+    ) -> tuple[AutopilotMemory, Scores, Command, Signals]:
+        """The sampling instant alone: the autopilot's memory and the scores after it, the command, the signals."""
         time = state.steps * parameters.period
         truth = self.plant.observe(state.plant, time, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
@@ -99,7 +105,9 @@ class ClosedLoop:
             parameters.autopilot,
             parameters.period,
         )
-        return memory, command, signals(truth, command, report)
+        recorded = signals(truth, command, report)
+        scores = self.scoring.step(state.scores, recorded, parameters.scoring, state.steps, parameters.period)
+        return memory, scores, command, recorded
 
     def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """The true losses, for a diagnosis source that is an oracle; nothing for any other."""

@@ -17,14 +17,15 @@ from rotorfault._version import __version__
 from rotorfault.assembly import assemble, assemble_all
 from rotorfault.control.python_controller import as_controller
 from rotorfault.engine import default_engine, load_engine
-from rotorfault.engine.batch import Array, Batch, Recording
+from rotorfault.engine.batch import Batch, Recording
 from rotorfault.errors import InputError
 from rotorfault.files import in_folder, output_folder, write_atomically
-from rotorfault.metrics import Outcome, finite_or_none, first_loss, judge, summary
+from rotorfault.metrics import Outcome, finite_or_none, judge, summary
 from rotorfault.progress import Bar
+from rotorfault.records import unflatten
 from rotorfault.report.text import summary_text
 from rotorfault.scenario import Scenario, load_scenario, override, scenario_from
-from rotorfault.touchdown import rested
+from rotorfault.scoring import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,7 +178,7 @@ def fly(
             f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
         )
     recording = _run(batch, name, [checked])
-    return _flight(checked, recording, 0, name, None if own is None else type(controller).__name__)
+    return _flight(checked, recording, batch, 0, name, None if own is None else type(controller).__name__)
 
 
 def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list[Flight]:
@@ -192,8 +193,9 @@ def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list
         if not isinstance(scenario, Scenario):
             raise InputError(f"got {scenario!r}; allowed: Scenario objects, such as load_scenario(...) returns")
     name = engine or default_engine(len(scenarios))
-    recording = _run(assemble_all(scenarios), name, scenarios)
-    return [_flight(scenario, recording, i, name, None) for i, scenario in enumerate(scenarios)]
+    batch = assemble_all(scenarios)
+    recording = _run(batch, name, scenarios)
+    return [_flight(scenario, recording, batch, i, name, None) for i, scenario in enumerate(scenarios)]
 
 
 def prepare(
@@ -252,41 +254,29 @@ def load(path: str | Path) -> Flight:
 
 
 def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
-    grounds = [scenario.ground for scenario in scenarios]
-    lands = [scenario.on_fault.kind == "land" for scenario in scenarios]
-    spacing = scenarios[0].period * batch.every
-    over = np.zeros(batch.flights, dtype=bool)  # lost, or landed
-    looked = 0
-    with Bar("flying", batch.steps * scenarios[0].period, "s") as bar:
+    period = scenarios[0].period
+    with Bar("flying", batch.steps * period, "s") as bar:
 
-        def watch(done: int, records: Array) -> bool:
-            nonlocal looked
-            bar.update(done * scenarios[0].period)
-            fresh, looked = records[looked:], len(records)
-            for i in np.flatnonzero(~over):
-                over[i] = len(fresh) > 0 and first_loss(fresh[:, :, i], grounds[i]) is not None
-                if lands[i] and not over[i]:
-                    over[i] = rested(records[:, :, i], np.arange(len(records), dtype=float) * spacing) is not None
-            return bool(over.all())
+        def watch(done: int) -> bool:
+            bar.update(done * period)
+            return False
 
         return load_engine(engine)(batch, watch)
 
 
-def _flight(scenario: Scenario, recording: Recording, index: int, engine: str, own: str | None) -> Flight:
-    signals = recording.signals[:, :, index]
-    times = recording.steps * scenario.period
-    found, landed = first_loss(signals, scenario.ground), rested(signals, times)
-    end = len(times)
-    if landed is not None and (found is None or landed < found[0]):
-        end, outcome = landed + 1, Outcome("landed", float(times[landed]))
-    elif found is not None:
-        # The record of the loss itself is kept where it has numbers, and the first in any case.
-        end = max(1, found[0] + (1 if np.isfinite(signals[found[0]]).all() else 0))
-        outcome = Outcome(found[1], float(times[found[0]]))
-    elif recording.interrupted:
-        outcome = Outcome("interrupted", float(times[-1]))
+def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, engine: str, own: str | None) -> Flight:
+    scores = unflatten(batch.state, recording.state[:, index].tolist()).scores
+    signals, times = recording.signals[:, :, index], recording.steps * scenario.period
+    kind = KINDS[int(scores.over)]
+    if kind != "flying":
+        outcome = Outcome(kind, float(scores.end) * scenario.period)
+        # The record of the end itself is kept where it has numbers, and the first in any case.
+        end = int(np.searchsorted(recording.steps, scores.end, side="right"))
+        end = max(1, end - (1 if not np.isfinite(signals[end - 1]).all() else 0))
     else:
-        outcome = Outcome("offset", scenario.steps * scenario.period)
+        end = len(times)
+        whole = scenario.steps * scenario.period
+        outcome = Outcome("interrupted", float(times[-1])) if recording.interrupted else Outcome("offset", whole)
     vehicle = scenario.vehicle.vehicle
     attributes = {
         "format": dataset.FORMAT,

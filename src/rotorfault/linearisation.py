@@ -242,7 +242,7 @@ def _scale(x: Array) -> Array:
 def _settled(flight: _Flight) -> Array:
     """The state of least change, as a column; an unstable loop leaves its equilibrium again."""
     x = best = flight.start
-    counted = leaf_names(flight.template).index("steps")
+    counted = np.array([name.startswith(("steps", "scores.")) for name in leaf_names(flight.template)])
     least = math.inf
     for _ in range(MOST_SETTLING):
         after, _ = flight.advance(x)

@@ -33,14 +33,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
+from rotorfault.scoring import ERROR_FLOOR, FAR, SETTLED, TRACKED
+from rotorfault.scoring import bands as bands_of
 from rotorfault.telemetry import SIGNAL_NAMES
 from rotorfault.touchdown import crashed, in_the_air, landing
 
-SETTLED = 0.02  # of the step
-TRACKED = 0.05  # of the span
-ERROR_FLOOR = 0.01  # m, in the cost's Q and R
 READ_AFTER = 0.15  # s after a fault at which the estimated loss is read
-FAR = 1e4  # m
 SURVIVED = ("settled", "tracked", "offset", "landed")
 
 _ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
@@ -86,11 +84,7 @@ def first_loss(signals: Array, ground: float | None) -> tuple[int, str] | None:
 
 def bands(data: xr.Dataset, share: float) -> NDArray[np.float64]:
     """Half width per axis [m] within which an error counts as small."""
-    reference, start = data["position_reference"].values, data["position"].values[0]
-    size = np.abs(reference[0] - start) if constant_reference(data) else np.ptp(reference, axis=0)
-    largest = float(size.max())
-    size = np.where(size > 1e-9, size, largest if largest > 1e-9 else 1.0)
-    return np.asarray(share * size)
+    return bands_of(data["position_reference"].values, data["position"].values[0], share)
 
 
 def constant_reference(data: xr.Dataset) -> bool:

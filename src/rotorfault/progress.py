@@ -54,3 +54,26 @@ class Bar:
             self._progress.start()
             self._task = self._progress.add_task(self.title, total=self.total)  # type: ignore[assignment]
         self._progress.update(self._task, completed=done)  # type: ignore[arg-type]
+
+
+class Busy:
+    """A line that says what is going on, for as long as it does; only on a terminal.
+
+    Parameters
+    ----------
+    what : str
+    """
+
+    def __init__(self, what: str) -> None:
+        self._what, self._console = what, Console(stderr=True)
+
+    def __enter__(self) -> Busy:
+        if sys.stderr.isatty():
+            self._console.print(f"{self._what} ...", end="\r", style="dim", highlight=False)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        if sys.stderr.isatty():
+            self._console.print(" " * (len(self._what) + 4), end="\r")

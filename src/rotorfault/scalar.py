@@ -1,8 +1,8 @@
 """Functions on scalars, whatever number type carries them.
 
 Every equation of rotorfault is written once, on scalars, with ``+ - * /`` and the functions of this module. This
-is the only file that knows which number types exist: Python floats, NumPy arrays, heyoka expressions and CasADi
-SX. A function looks at *all* its arguments to choose the type, so that floats and symbols may be mixed.
+is the only file that knows which number types exist: Python floats, NumPy arrays, the terms of
+`rotorfault.engine.trace`, heyoka expressions and CasADi SX. A function looks at *all* its arguments to choose the type, so that floats and symbols may be mixed.
 
 Rules that every function keeps:
 
@@ -11,27 +11,43 @@ Rules that every function keeps:
 - A condition is a number, 1 where it holds and 0 where not; `both`, `either` and `negated` combine conditions.
 - ``sqrt`` of a negative float is NaN, not an exception: failure is data.
 
-heyoka and CasADi are never imported here: their expressions bring their module with them.
+Symbols' modules are never imported here: their expressions bring their module with them.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+from functools import partial
 from types import ModuleType
 from typing import Any, TypeAlias
 
 import numpy as np
 
 Scalar: TypeAlias = Any
-"""A float, a NumPy array, a heyoka expression or a CasADi SX: whatever one engine computes with."""
+"""A float, a NumPy array, a term, a heyoka expression or a CasADi SX: whatever one engine computes with."""
 
 NAN = math.nan
 
-_LARGEST_ANGLE = 1e14  # rad: beyond it doubles are a hundredth of a radian apart
+
+class _Derived:
+    """What every number type can do by selection; a type that has better overrides it."""
+
+    less: Any
+    less_equal: Any
+    select: Any
+
+    def minimum(self, a: Scalar, b: Scalar) -> Scalar:
+        return self.select(self.less(a, b), a, self.select(self.less_equal(b, a), b, a + b))
+
+    def maximum(self, a: Scalar, b: Scalar) -> Scalar:
+        return self.select(self.less(b, a), a, self.select(self.less_equal(a, b), b, a + b))
+
+    def absolute(self, x: Scalar) -> Scalar:
+        return self.select(self.less(x, 0.0), -x, x)
 
 
-class _Floats:
+class _Floats(_Derived):
     """Python floats. ``math`` raises where IEEE arithmetic gives NaN or infinity; here it must not."""
 
     @staticmethod
@@ -62,6 +78,10 @@ class _Floats:
     tanh = staticmethod(math.tanh)
 
     @staticmethod
+    def nearest(x: float) -> float:
+        return float(round(x)) if abs(x) < math.inf else x
+
+    @staticmethod
     def less(a: float, b: float) -> float:
         return 1.0 if a < b else 0.0
 
@@ -74,11 +94,11 @@ class _Floats:
         return a if condition else b
 
 
-class _Arrays:
+class _Arrays(_Derived):
     """NumPy arrays, one element per flight."""
 
     sqrt, exp, sin, cos, tan = np.sqrt, np.exp, np.sin, np.cos, np.tan
-    asin, atan2, tanh = np.arcsin, np.arctan2, np.tanh
+    asin, atan2, tanh, nearest = np.arcsin, np.arctan2, np.tanh, np.rint
 
     @staticmethod
     def less(a: Scalar, b: Scalar) -> Scalar:
@@ -93,14 +113,14 @@ class _Arrays:
         return np.where(condition, a, b)
 
 
-class _Heyoka:
+class _Heyoka(_Derived):
     """heyoka expressions. Its functions refuse plain floats and its comparisons are functions, not operators."""
 
     def __init__(self, module: ModuleType) -> None:
         self._expression = module.expression
         self._lt, self._lte, self._select = module.lt, module.lte, module.select
-        self._atan2, self._cos, self._tan = module.atan2, module.cos, module.tan
-        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "asin", "tanh")}
+        self._atan2, self._cos, self._sin = module.atan2, module.cos, module.sin
+        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "cos", "tan", "asin", "tanh")}
         self._sqrt = module.sqrt
 
     def __getattr__(self, name: str) -> Any:
@@ -110,17 +130,10 @@ class _Heyoka:
     def sqrt(self, x: Scalar) -> Scalar:
         return self._sqrt(x)
 
-    def cos(self, x: Scalar) -> Scalar:
-        return self._lane_by_lane(self._cos, x)
-
-    def tan(self, x: Scalar) -> Scalar:
-        return self._lane_by_lane(self._tan, x)
-
-    def _lane_by_lane(self, function: Any, x: Scalar) -> Scalar:
-        # Where one lane is NaN or beyond 1e14, the vectorised cosine takes another way for all lanes, which rounds
-        # differently: a flight that is lost would change the last bits of its neighbours.
-        plain = self._lte(self._lift(-_LARGEST_ANGLE), x) * self._lte(x, self._lift(_LARGEST_ANGLE))
-        return self._select(plain, function(self._select(plain, x, self._lift(0.0))), self._lift(NAN))
+    def nearest(self, x: Scalar) -> Scalar:
+        # There is no rounding: the distance from the nearest whole number is an angle.
+        turn = x * (2.0 * math.pi)
+        return x - self._atan2(self._sin(turn), self._cos(turn)) * (0.5 / math.pi)
 
     def _lift(self, x: Scalar) -> Scalar:
         return x if isinstance(x, self._expression) else self._expression(float(x))
@@ -140,7 +153,7 @@ class _Heyoka:
         return self._select(condition, self._lift(a), self._lift(b))
 
 
-class _Casadi:
+class _Casadi(_Derived):
     """CasADi SX (or MX), for linearisation and C code."""
 
     def __init__(self, module: ModuleType) -> None:
@@ -148,6 +161,22 @@ class _Casadi:
         self.sqrt, self.exp, self.sin, self.cos = module.sqrt, module.exp, module.sin, module.cos
         self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
         self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
+
+    def nearest(self, x: Scalar) -> Scalar:
+        return self._module.floor(x + 0.5)
+
+
+class _Terms(_Derived):
+    """Terms of the compiled engine."""
+
+    def __init__(self, module: ModuleType) -> None:
+        self._function = module.function
+        self.less, self.less_equal, self.select = module.less, module.less_equal, module.select
+        self.minimum, self.maximum = module.minimum, module.maximum  # type: ignore[method-assign]
+        self.absolute = module.absolute  # type: ignore[method-assign]
+
+    def __getattr__(self, name: str) -> Any:
+        return partial(self._function, "round" if name == "nearest" else name)
 
 
 _FLOATS, _ARRAYS = _Floats(), _Arrays()
@@ -167,6 +196,8 @@ def _adopt(kind: type) -> Any:
         found: Any = _Heyoka(sys.modules["heyoka"])
     elif family == "casadi":
         found = _Casadi(sys.modules["casadi"])
+    elif kind.__module__ == "rotorfault.engine.trace":
+        found = _Terms(sys.modules[kind.__module__])
     elif issubclass(kind, (np.ndarray, np.generic)):
         found = _ARRAYS if issubclass(kind, np.ndarray) else _FLOATS
     else:
@@ -276,20 +307,17 @@ def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
 
 def minimum(a: Scalar, b: Scalar) -> Scalar:
     """The smaller of two; NaN if either is NaN."""
-    f = _of(a, b)
-    return f.select(f.less(a, b), a, f.select(f.less_equal(b, a), b, a + b))
+    return _of(a, b).minimum(a, b)
 
 
 def maximum(a: Scalar, b: Scalar) -> Scalar:
     """The larger of two; NaN if either is NaN."""
-    f = _of(a, b)
-    return f.select(f.less(b, a), a, f.select(f.less_equal(a, b), b, a + b))
+    return _of(a, b).maximum(a, b)
 
 
 def absolute(x: Scalar) -> Scalar:
     """Magnitude."""
-    f = _of(x)
-    return f.select(f.less(x, 0.0), -x, x)
+    return _of(x).absolute(x)
 
 
 def sign(x: Scalar) -> Scalar:
@@ -309,9 +337,14 @@ def saturate(x: Scalar) -> Scalar:
     return f.select(f.less(x, -1.0), -1.0, f.select(f.less(1.0, x), 1.0, x))
 
 
+def nearest(x: Scalar) -> Scalar:
+    """The nearest whole number; of two that are equally near, either."""
+    return _of(x).nearest(x)
+
+
 def wrap_angle(x: Scalar) -> Scalar:
-    """The angle equal to x modulo a full turn, in (-pi, pi]."""
-    return atan2(sin(x), cos(x))
+    """The angle equal to x modulo a full turn, in [-pi, pi]; its error grows by 1e-16 rad with each turn."""
+    return x - (2.0 * math.pi) * nearest(x * (0.5 / math.pi))
 
 
 def is_finite(x: Scalar) -> Scalar:

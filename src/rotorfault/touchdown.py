@@ -13,12 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
+from rotorfault.scoring import REST, SLIDE_MAX, SPEED_MAX, TILT_MAX
 from rotorfault.telemetry import SIGNAL_NAMES
-
-SPEED_MAX = 1.0  # m/s, downwards: as after a fall from 5 cm
-SLIDE_MAX = 0.5  # m/s, horizontal
-TILT_MAX = 0.2617993877991494  # rad: 15 degrees
-REST = 0.5  # s that it must stand with rotors stopped; then the flight is over
 
 _ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
 

@@ -1,6 +1,6 @@
 """Engines: run a batch of flights of one closed loop, on one number type each.
 
-An engine is loaded when it is first asked for, so that heyoka's absence costs nothing but its speed.
+An engine is loaded when it is first asked for, so that llvmlite's absence costs nothing but its speed.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from rotorfault.errors import InputError
 from rotorfault.registry import unknown
 
 ENGINES = {
-    "simd": ("rotorfault.engine.simd", "heyoka: compiled, SIMD lanes; the default where heyoka is installed"),
+    "simd": ("rotorfault.engine.simd", "machine code by LLVM, vector lanes and threads; the default where llvmlite is installed"),
     "numpy": ("rotorfault.engine.arrays", "NumPy arrays: batches without a compiler; a single flight is slow"),
     "python": ("rotorfault.engine.python", "Python floats: any controller, easy to step through"),
 }
 
 
 def have_simd() -> bool:
-    """Whether heyoka is installed."""
-    return importlib.util.find_spec("heyoka") is not None
+    """Whether llvmlite is installed."""
+    return importlib.util.find_spec("llvmlite") is not None
 
 
 def default_engine(count: int) -> str:
@@ -38,10 +38,10 @@ def load_engine(name: str) -> Engine:
     Raises
     ------
     InputError
-        If there is no such engine, or it needs heyoka and heyoka is not installed.
+        If there is no such engine, or it needs llvmlite and that is not installed.
     """
     if name not in ENGINES:
         raise InputError(unknown("engine", name, list(ENGINES)))
     if name == "simd" and not have_simd():
-        raise InputError("engine 'simd' needs heyoka, which is not installed; use --engine numpy or --engine python")
+        raise InputError("engine 'simd' needs llvmlite, which is not installed; use --engine numpy or --engine python")
     return cast("Engine", importlib.import_module(ENGINES[name][0]).run)

@@ -13,27 +13,30 @@ from rotorfault.engine.batch import (
     columns,
     drive_rows,
     drive_template,
+    no_watch,
+    over_row,
     recorded,
 )
 from rotorfault.records import unflatten
 
 
-def run(batch: Batch, watch: Watch) -> Recording:
+def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:
     """Fly a batch on NumPy arrays; see `rotorfault.engine.batch.Engine`."""
     template = drive_template(batch)
     parameters = unflatten(batch.parameters, list(columns(batch.parameters, batch.flights)))
     state = unflatten(batch.state, list(columns(batch.state, batch.flights)))
-    records = Records(batch)
+    records, done, interrupted, over = Records(batch), 0, False, over_row(batch)
     try:
         with np.errstate(all="ignore"):  # failure is data: NaN shows in the record
             for first, rows in drive_rows(batch):
                 wanted = set(recorded(batch, first, len(rows)))
                 for k, row in enumerate(np.broadcast_to(rows, (*rows.shape[:2], batch.flights))):
                     state, signals = batch.loop.step(state, as_drive(unflatten(template, list(row))), parameters)
+                    done += 1
                     if k in wanted:
-                        records.add(first + k, columns(signals, batch.flights))
-                if watch(first + len(rows), records.so_far):
+                        records.add(first + k, columns(signals, batch.flights)[None])
+                if watch(done) or (columns(state, batch.flights)[over] != 0.0).all():
                     break
     except KeyboardInterrupt:
-        return records.recording(interrupted=True)
-    return records.recording()
+        interrupted = True
+    return records.recording(columns(state, batch.flights), done * batch.flights, interrupted)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
 from rotorfault.geometry import zeros
 from rotorfault.plant.sensors import no_noise
-from rotorfault.records import flatten
+from rotorfault.records import flatten, leaf_names
 from rotorfault.signals import Reference
 from rotorfault.telemetry import SIGNAL_NAMES
 
 Array = NDArray[np.float64]
-CHUNK = 500  # steps between two looks at progress, noise and early endings
+CHUNK = 500  # steps between two looks at progress, noise and flights that are over
 
 
 class Batch(NamedTuple):
@@ -28,7 +28,8 @@ class Batch(NamedTuple):
     reference: Array  # (steps, 12): rows of `Reference`, shared by all flights
     flights: int  # N
     seeds: tuple[tuple[int, int], ...]  # (seed, flight index) per flight: names its random numbers
-    every: int = 1  # record each so many steps
+    every: int = 1  # record each so many steps; 0 records nothing
+    wanted: tuple[int, ...] | None = None  # rows of `Signals` that are recorded; None for all
 
     @property
     def steps(self) -> int:
@@ -37,25 +38,27 @@ class Batch(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """Signals of a batch; a flight that was cut short has fewer records."""
+    """What came of a batch; a batch whose flights were all over early has fewer records."""
 
-    signals: Array  # (records, rows of `Signals`, N)
+    signals: Array  # (records, recorded rows of `Signals`, N); NaN where a flight was over long before
     steps: Array  # (records,): number of the step at which each record was taken
+    state: Array  # (leaves of `LoopState`, N): at the end, scores included
+    flown: int  # flight-steps that were computed
     interrupted: bool = False
 
 
-Watch = Callable[[int, Array], bool]
-"""Called after each chunk with the steps done and the records so far; returns True to end the batch early."""
+Watch = Callable[[int], bool]
+"""Called now and then with the steps done, the mean of all flights; returns True to end the batch early."""
 
 
 class Engine(Protocol):
-    """Runs batches on one number type."""
+    """Runs batches on one number type. A flight that is over may be dropped at the next chunk of steps."""
 
-    def __call__(self, batch: Batch, watch: Watch) -> Recording:
-        """Fly a batch."""
+    def __call__(self, batch: Batch, watch: Watch, threads: int | None = None) -> Recording:
+        """Fly a batch; on as many threads as there are processors, or as are given, where the engine has threads."""
 
 
-def no_watch(done: int, records: Array) -> bool:
+def no_watch(done: int) -> bool:
     """Never ends a batch early."""
     return False
 
@@ -70,9 +73,19 @@ class Noise:
     def __init__(self, seeds: tuple[tuple[int, int], ...]) -> None:
         self._generators = [np.random.Generator(np.random.Philox(np.random.SeedSequence(s))) for s in seeds]
 
+    def each(self, steps: int) -> Iterator[Array]:
+        """Numbers of the next steps, flight by flight, shape (steps, 12)."""
+        return (g.standard_normal((steps, 12)) for g in self._generators)
+
     def draw(self, steps: int) -> Array:
         """Numbers of the next steps, shape (steps, 12, N)."""
-        return np.stack([g.standard_normal((steps, 12)) for g in self._generators], axis=2)
+        return np.stack(list(self.each(steps)), axis=2)
+
+    def only(self, flights: Sequence[int]) -> Noise:
+        """The generators of some of the flights, where they are."""
+        some = Noise(())
+        some._generators = [self._generators[i] for i in flights]
+        return some
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
@@ -102,41 +115,66 @@ def as_drive(record: Any) -> Drive:
     return record if isinstance(record, Drive) else Drive(record, no_noise())
 
 
-def columns(record: Any, count: int) -> Array:
-    """Leaves of a record as rows of an array (leaves, N); floats are repeated."""
-    return np.stack([np.broadcast_to(np.asarray(leaf, dtype=float), (count,)) for leaf in flatten(record)])
+def columns(record: Any, count: int, part: slice = slice(None)) -> Array:
+    """Leaves of a record as rows of an array (leaves, N), or a part of its columns; floats are repeated."""
+    leaves = flatten(record)
+    rows = np.empty((len(leaves), len(range(count)[part])))
+    for row, leaf in zip(rows, leaves, strict=True):
+        row[:] = leaf[part] if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
+    return rows
 
 
 def recorded(batch: Batch, first: int, length: int) -> list[int]:
     """Which steps of a chunk are to be recorded, counted from its first."""
-    return [k for k in range(length) if (first + k) % batch.every == 0]
+    return [k for k in range(length) if batch.every and (first + k) % batch.every == 0]
+
+
+def over_row(batch: Batch) -> int:
+    """Row of the state that is not 0 once a flight is over."""
+    return leaf_names(batch.state).index("scores.over")
 
 
 class Records:
-    """Records taken one by one, in one array that is there from the start.
+    """Records of a batch, in one array that is there from the start.
 
     To stack them anew for every look would take time with the square of a flight's length. Memory is occupied only
     as far as it is written.
     """
 
     def __init__(self, batch: Batch) -> None:
-        capacity = -(-batch.steps // batch.every)
-        self._signals = np.empty((capacity, len(SIGNAL_NAMES), batch.flights))
-        self._steps = np.empty(capacity)
+        self.every = batch.every
+        self._rows = None if batch.wanted is None else list(batch.wanted)
+        capacity = 0 if batch.every == 0 else -(-batch.steps // batch.every)
+        width = len(SIGNAL_NAMES) if self._rows is None else len(self._rows)
+        self._signals = np.empty((capacity, width, batch.flights))
+        if batch.flights > 1:
+            self._signals[:] = np.nan  # for flights that are dropped because they are over
         self._filled = 0
 
-    def add(self, step: int, signals: Array) -> None:
-        """Keep the signals of a step, shape (rows of `Signals`, N)."""
-        self._signals[self._filled], self._steps[self._filled] = signals, step
-        self._filled += 1
+    def add(self, step: int, signals: Array, flights: Any = slice(None)) -> None:
+        """Keep signals of consecutive recorded steps from `step` on.
 
-    @property
-    def so_far(self) -> Array:
-        """The records so far, not copied; shape (records, rows of `Signals`, N)."""
-        return self._signals[: self._filled]
+        Parameters
+        ----------
+        step : int
+            A multiple of `every`.
+        signals : ndarray, shape (records, rows of `Signals`, flights)
+        flights : slice or array of int
+            Which of the batch they are.
+        """
+        first = step // self.every
+        chosen = signals if self._rows is None else signals[:, self._rows]
+        self._signals[first : first + len(signals), :, flights] = chosen
+        self._filled = max(self._filled, first + len(signals))
 
-    def recording(self, interrupted: bool = False) -> Recording:
+    def until(self, step: int) -> None:
+        """Forget records from a step on: some of the flights have not got there."""
+        if self.every:
+            self._filled = min(self._filled, -(-step // self.every))
+
+    def recording(self, state: Array, flown: int, interrupted: bool = False) -> Recording:
         """All of them; KeyboardInterrupt if it came before the first."""
-        if self._filled == 0:
+        if interrupted and self._filled == 0:
             raise KeyboardInterrupt
-        return Recording(self.so_far, self._steps[: self._filled], interrupted)
+        steps = np.arange(self._filled) * float(self.every)
+        return Recording(self._signals[: self._filled], steps, state, flown, interrupted)

@@ -5,7 +5,7 @@ processor, and the structure of the loop (classes and settings of its parts). A 
 the source of its own module; where that cannot be read, the loop is kept in the process only.
 
 On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
-off). A file begins with the SHA-256 of the rest, for heyoka loads damaged code without complaint; one that is
+off). A file begins with the SHA-256 of the rest, for damaged code would be loaded without complaint; one that is
 damaged or cannot be read is compiled anew and replaced.
 """
 
@@ -13,20 +13,19 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import json
 import os
-import pickle
-import platform
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorfault.closed_loop import ClosedLoop
+from rotorfault.engine.program import Layout
 from rotorfault.engine.structure import parts_of, structure
 from rotorfault.files import write_atomically
 
-KEEP = 100  # compiled loops on disk
-_KEPT: dict[str, Any] = {}
+KEEP = 200  # compiled loops on disk
 _SUM_LENGTH = hashlib.sha256().digest_size
 
 
@@ -37,9 +36,29 @@ class Key(NamedTuple):
     lasting: bool
 
 
-def key(loop: ClosedLoop, compiler: str, form: str = "whole") -> Key:
-    """Name of a compiled form of a loop."""
-    words = [_package_digest(), compiler, form, _processor(), *structure(loop)]
+class Compiled(NamedTuple):
+    """Object code of a loop, and what its caller must know."""
+
+    code: bytes
+    layout: Layout
+    operations: dict[str, int]  # of one step, by sort
+
+
+_KEPT: dict[str, Compiled] = {}
+
+
+def key(loop: ClosedLoop, compiler: str, form: str) -> Key:
+    """Name of a compiled form of a loop.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+    compiler : str
+        Version of the compiler, and the processor that it compiles for.
+    form : str
+        Which of the programs of the loop.
+    """
+    words = [_package_digest(), compiler, form, *structure(loop)]
     lasting = True
     for part in parts_of(loop):
         if not type(part).__module__.startswith("rotorfault."):
@@ -50,7 +69,7 @@ def key(loop: ClosedLoop, compiler: str, form: str = "whole") -> Key:
     return Key(hashlib.sha256("\n".join(words).encode()).hexdigest(), lasting)
 
 
-def get(name: Key, make: Callable[[], Any]) -> Any:
+def get(name: Key, make: Callable[[], Compiled]) -> Compiled:
     """The compiled loop of this name, made if there is none."""
     if name.digest not in _KEPT:
         path = _path(name)
@@ -62,56 +81,57 @@ def get(name: Key, make: Callable[[], Any]) -> Any:
     return _KEPT[name.digest]
 
 
-def _path(name: Key) -> Path | None:
-    folder = os.environ.get("ROTORFAULT_CACHE")
-    if not name.lasting or folder == "":
+def folder() -> Path | None:
+    """Where compiled loops lie; None where the user wants none."""
+    named = os.environ.get("ROTORFAULT_CACHE")
+    if named == "":
         return None
-    if folder is None:
-        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        folder = str(Path(base) / "rotorfault")
-    return Path(folder) / f"{name.digest}.loop"
+    if named is not None:
+        return Path(named)
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "rotorfault"
 
 
-def _prune(folder: Path) -> None:
+def _path(name: Key) -> Path | None:
+    place = folder() if name.lasting else None
+    return None if place is None else place / f"{name.digest}.loop"
+
+
+def _prune(place: Path) -> None:
     """Keep the newest compiled loops only: every change of the package leaves old ones behind."""
-    old = sorted(folder.glob("*.loop"), key=lambda file: file.stat().st_mtime)[: -KEEP + 1]
+    old = sorted(place.glob("*.loop"), key=lambda file: file.stat().st_mtime)[: -KEEP + 1]
     for file in old:
         file.unlink(missing_ok=True)
 
 
-def _load(path: Path | None) -> Any:
+def _load(path: Path | None) -> Compiled | None:
     if path is None:
         return None
     try:
         content = path.read_bytes()
         sum_, made = content[:_SUM_LENGTH], content[_SUM_LENGTH:]
-        return pickle.loads(made) if hashlib.sha256(made).digest() == sum_ else None
+        if hashlib.sha256(made).digest() != sum_:
+            return None
+        head, _, code = made.partition(b"\n")
+        about: dict[str, Any] = json.loads(head)
+        return Compiled(code, Layout(**about["layout"]), about["operations"])
     except Exception:
-        # Missing, or of another heyoka: whatever it is, the loop can be compiled anew.
+        # Missing, or of another version: whatever it is, the loop can be compiled anew.
         return None
 
 
-def _store(path: Path | None, made: Any) -> None:
+def _store(path: Path | None, made: Compiled) -> None:
     if path is None:
         return
+    head = json.dumps({"layout": made.layout._asdict(), "operations": made.operations}).encode()
+    content = head + b"\n" + made.code
+    content = hashlib.sha256(content).digest() + content
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        content = pickle.dumps(made)
-        content = hashlib.sha256(content).digest() + content
         _prune(path.parent)
         write_atomically(path, lambda temporary: temporary.write_bytes(content))
     except OSError:
         return  # a cache that cannot be written costs a second next time, nothing else
-
-
-def _processor() -> str:
-    """What compiled code depends on of the machine: architecture, and the instruction sets where Linux lists them."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    flags = next((line for line in lines if line.startswith(("flags", "Features"))), "")
-    return f"{platform.machine()} {platform.processor()} {flags}"
 
 
 @lru_cache(maxsize=1)

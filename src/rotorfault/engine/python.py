@@ -13,16 +13,18 @@ from rotorfault.engine.batch import (
     columns,
     drive_rows,
     drive_template,
+    no_watch,
+    over_row,
     recorded,
 )
 from rotorfault.records import flatten, unflatten
 from rotorfault.telemetry import SIGNAL_NAMES, Signals
 
 
-def run(batch: Batch, watch: Watch) -> Recording:
+def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:
     """Fly a batch on Python floats; see `rotorfault.engine.batch.Engine`.
 
-    Where float arithmetic raises (division by zero, overflow) the flight goes on as NaN, as in the other engines.
+    Where float arithmetic raises (division by zero, overflow) the flight is lost as NaN, as in the other engines.
     """
     template = drive_template(batch)
     numbers, starts = columns(batch.parameters, batch.flights), columns(batch.state, batch.flights)
@@ -30,7 +32,11 @@ def run(batch: Batch, watch: Watch) -> Recording:
     states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.flights)]
     lost = [False] * batch.flights
     missing = [np.nan] * len(SIGNAL_NAMES)
-    records = Records(batch)
+    records, done, interrupted, over = Records(batch), 0, False, over_row(batch)
+
+    def state() -> np.ndarray:
+        return np.array([[float(leaf) for leaf in flatten(one)] for one in states]).T
+
     try:
         for first, rows in drive_rows(batch):
             wanted = set(recorded(batch, first, len(rows)))
@@ -44,12 +50,21 @@ def run(batch: Batch, watch: Watch) -> Recording:
                             states[i], signals = batch.loop.step(states[i], drive, parameters[i])
                         except (ZeroDivisionError, OverflowError):
                             lost[i] = True
+                            states[i] = _diverged(states[i], first + k)
                     if k in wanted:
                         taken.append(missing if signals is None else [float(x) for x in flatten(signals)])
+                done += 1
                 if k in wanted:
-                    records.add(first + k, np.array(taken).T)
-            if watch(first + len(rows), records.so_far):
+                    records.add(first + k, np.array(taken).T[None])
+            if watch(done) or (state()[over] != 0.0).all():
                 break
     except KeyboardInterrupt:
-        return records.recording(interrupted=True)
-    return records.recording()
+        interrupted = True
+    return records.recording(state(), done * batch.flights, interrupted)
+
+
+def _diverged(state, step):  # type: ignore[no-untyped-def]
+    """The same flight, over: it has no numbers from this step on."""
+    if state.scores.over != 0.0:
+        return state
+    return state._replace(scores=state.scores._replace(over=1.0, end=float(step)))

@@ -1,42 +1,208 @@
-"""Engine on heyoka: the closed loop traced once, compiled by LLVM, run over SIMD lanes.
+"""Engine on machine code: the closed loop traced once, compiled by LLVM, run over vector lanes and threads.
 
-Every batch, a single flight too, is padded to whole SIMD groups: lanes and a scalar remainder would differ in the
-last bits, and a flight's numbers must not depend on its neighbours.
+Flights are flown in blocks small enough for the cache, each block by one thread from its first step to its last, in
+chunks of steps. Between two chunks random numbers are drawn, and flights that are over make room: the others move
+together, and groups of lanes that have become empty are flown no further. What a flight's numbers are depends on none
+of that: each lane computes for itself, with the same operations in the same order.
 """
 
 from __future__ import annotations
 
-import heyoka as hy
+import os
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import final
+
 import numpy as np
+from numpy.typing import NDArray
 
-from rotorfault.engine.batch import Array, Batch, Recording, Records, Watch, columns, drive_rows, recorded
-from rotorfault.engine.compiled import stepper
+from rotorfault.engine.batch import CHUNK, Array, Batch, Noise, Recording, Records, Watch, columns, no_watch
+from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
+
+GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
+PATIENCE = 0.1  # s between two looks at progress
 
 
-def run(batch: Batch, watch: Watch) -> Recording:
-    """Fly a batch on SIMD lanes; see `rotorfault.engine.batch.Engine`."""
-    lanes = hy.recommended_simd_size()
-    padded = -(-batch.flights // lanes) * lanes
-
-    def widened(rows: Array) -> Array:
-        # Spare lanes fly the last flight again: a lane of zeros could cost time in NaN or denormal arithmetic.
-        return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, padded - batch.flights)), mode="edge"))
-
-    loop = stepper(
-        batch, widened(columns(batch.state, batch.flights)), widened(columns(batch.parameters, batch.flights))
-    )
-    records = Records(batch)
+def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:
+    """Fly a batch on vector lanes; see `rotorfault.engine.batch.Engine`."""
+    flight = _Common(batch)
+    blocks = [flight.block(first) for first in range(0, batch.flights, flight.block_size)]
+    threads = min(threads or os.cpu_count() or 1, len(blocks))
+    interrupted = False
     try:
-        for first, rows in drive_rows(batch):
-            if rows.shape[2] > 1:
-                rows = np.pad(rows, ((0, 0), (0, 0), (0, padded - batch.flights)), mode="edge")
-            wanted = set(recorded(batch, first, len(rows)))
-            for k, row in enumerate(rows):
-                signals = loop.advance(row)
-                if k in wanted:
-                    records.add(first + k, signals[:, : batch.flights])
-            if watch(first + len(rows), records.so_far):
-                break
+        if threads == 1:
+            for block in blocks:
+                for _ in block.chunks():
+                    if watch(flight.done // batch.flights):
+                        flight.stop.set()
+        else:
+            _run_threads(flight, blocks, watch, threads)
     except KeyboardInterrupt:
-        return records.recording(interrupted=True)
-    return records.recording()
+        flight.stop.set()
+        interrupted = True
+    if flight.stop.is_set():
+        flight.records.until(min(block.reached for block in blocks))
+    if interrupted and batch.every == 0:
+        raise KeyboardInterrupt
+    return flight.records.recording(flight.state, flight.done, interrupted)
+
+
+def _run_threads(flight: _Common, blocks: list[_Block], watch: Watch, threads: int) -> None:
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: set[Future[None]] = {pool.submit(block.fly) for block in blocks}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=PATIENCE)
+                for future in done:
+                    future.result()
+                if watch(flight.done // flight.batch.flights):
+                    flight.stop.set()
+        except BaseException:
+            flight.stop.set()
+            raise
+
+
+@final
+class _Common:
+    """What all blocks of a batch share."""
+
+    def __init__(self, batch: Batch) -> None:
+        machines = Machines(batch)
+        self.batch = batch
+        self.quiet = machines.get(with_signals=False) if batch.every != 1 else None
+        self.recording = machines.get(with_signals=True) if batch.every != 0 else None
+        any_machine = self.quiet or self.recording
+        assert any_machine is not None
+        self.layout, self.lanes = any_machine.layout, any_machine.lanes
+        self.block_size = GROUPS * self.lanes
+        self.records = Records(batch)
+        self.state = np.empty((self.layout.state, batch.flights))
+        self.reference = np.ascontiguousarray(batch.reference)
+        self.stop = threading.Event()
+        self._lock, self.done = threading.Lock(), 0
+
+    def block(self, first: int) -> _Block:
+        """The block of flights that begins with this one."""
+        return _Block(self, np.arange(first, min(first + self.block_size, self.batch.flights)))
+
+    def count(self, steps: int) -> None:
+        """Flight-steps have been done."""
+        with self._lock:
+            self.done += steps
+
+
+@final
+class _Block:
+    """Some flights, flown together. Nothing is allocated before it begins."""
+
+    def __init__(self, common: _Common, flights: NDArray[np.intp]) -> None:
+        self._common, self._flights, self.reached = common, flights, 0
+
+    def fly(self) -> None:
+        """From the first step to the last."""
+        for _ in self.chunks():
+            pass
+
+    def chunks(self) -> Iterator[None]:
+        """Fly chunk by chunk."""
+        common, batch = self._common, self._common.batch
+        self._begin()
+        for first in range(0, batch.steps, CHUNK):
+            if common.stop.is_set():
+                break
+            steps = min(CHUNK, batch.steps - first)
+            self._advance(first, steps)
+            self.reached = first + steps
+            common.count(len(self._flights) * steps)
+            self._drop()
+            yield
+            if not len(self._flights):
+                break
+        else:
+            self._keep(self._flights, ungrouped(self._state, len(self._flights)))
+            self.reached = batch.steps
+            return
+        if len(self._flights):
+            self._keep(self._flights, ungrouped(self._state, len(self._flights)))
+        else:
+            self.reached = batch.steps  # nothing is left that could be recorded
+
+    def _begin(self) -> None:
+        common, batch = self._common, self._common.batch
+        part = slice(int(self._flights[0]), int(self._flights[-1]) + 1)
+        self._state = grouped(columns(batch.state, batch.flights, part), common.lanes)
+        parameters = grouped(columns(batch.parameters, batch.flights, part), common.lanes)
+        self._prepared = {
+            id(machine): machine.prepare(parameters)
+            for machine in (common.quiet, common.recording)
+            if machine is not None
+        }
+        self._noise = Noise(batch.seeds[part]) if common.layout.own else None
+
+    def _advance(self, first: int, steps: int) -> None:
+        """Fly some steps, and record those that are wanted."""
+        common, every = self._common, self._common.batch.every
+        shared = common.reference[first : first + steps]
+        own = self._own(steps)
+        if common.recording is None:
+            assert common.quiet is not None
+            self._call(common.quiet, shared, own)
+            return
+        if common.quiet is None:
+            self._record(first, shared, own)
+            return
+        k = 0
+        while k < steps:
+            wanted = (first + k) % every == 0
+            until = k + 1 if wanted else min(steps, k + every - (first + k) % every)
+            piece = None if own is None else np.ascontiguousarray(own[:, k:until])
+            if wanted:
+                self._record(first + k, shared[k:until], piece)
+            else:
+                self._call(common.quiet, shared[k:until], piece)
+            k = until
+
+    def _record(self, first: int, shared: Array, own: Array | None) -> None:
+        machine = self._common.recording
+        assert machine is not None
+        out = aligned((len(self._state), len(shared), machine.layout.signals, machine.lanes))
+        self._call(machine, shared, own, out)
+        by_flight = out.transpose(1, 2, 0, 3).reshape(len(shared), machine.layout.signals, -1)
+        self._common.records.add(first, by_flight[:, :, : len(self._flights)], self._flights)
+
+    def _call(self, machine: Machine, shared: Array, own: Array | None, out: Array | None = None) -> None:
+        machine.fly(self._state, self._prepared[id(machine)], shared, own, out)
+
+    def _own(self, steps: int) -> Array | None:
+        """Random numbers of the next steps, shape (groups, steps, rows, lanes)."""
+        if self._noise is None:
+            return None
+        lanes = self._common.lanes
+        own = aligned((len(self._state), steps, self._common.layout.own, lanes))
+        for i, numbers in enumerate(self._noise.each(steps)):
+            own[i // lanes, :, :, i % lanes] = numbers
+        return own
+
+    def _drop(self) -> None:
+        """Let flights that are over make room, where that saves a group of lanes."""
+        lanes, count = self._common.lanes, len(self._flights)
+        over = self._state[:, self._common.layout.over].reshape(-1)[:count] != 0.0
+        left = int(count - over.sum())
+        if -(-left // lanes) == len(self._state) and left:
+            return
+        rows = ungrouped(self._state, count)
+        self._keep(self._flights[over], rows[:, over])
+        flying = np.flatnonzero(~over)
+        self._flights = self._flights[flying]
+        if not left:
+            return
+        self._state = grouped(rows[:, flying], lanes)
+        self._prepared = {
+            key: grouped(ungrouped(prepared, count)[:, flying], lanes) for key, prepared in self._prepared.items()
+        }
+        if self._noise is not None:
+            self._noise = self._noise.only(flying)
+
+    def _keep(self, flights: NDArray[np.intp], rows: Array) -> None:
+        self._common.state[:, flights] = rows

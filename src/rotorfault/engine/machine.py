@@ -1,0 +1,101 @@
+"""A closed loop as a machine: compiled (or found compiled), loaded, and fed with arrays in its own layout."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, final
+
+import numpy as np
+
+from rotorfault.engine import cache, native
+from rotorfault.engine.batch import Array, Batch
+from rotorfault.engine.cache import Compiled
+from rotorfault.engine.program import program, trace
+from rotorfault.progress import Busy
+
+_FUNCTIONS = (("prepare", 2, 1), ("fly", 5, 2))
+_NOTHING = np.zeros(1)
+_LOADED: dict[str, Machine] = {}
+
+
+@final
+class Machine:
+    """The compiled program of a closed loop, with or without signals."""
+
+    def __init__(self, compiled: Compiled) -> None:
+        self.layout, self.operations = compiled.layout, compiled.operations
+        self.lanes = native.lanes()
+        self._native = native.Native(compiled.code, _FUNCTIONS)
+
+    def prepare(self, parameters: Array) -> Array:
+        """What is computed once per flight.
+
+        Parameters
+        ----------
+        parameters : ndarray, shape (groups, rows of the parameters, lanes)
+
+        Returns
+        -------
+        ndarray, shape (groups, prepared rows, lanes)
+        """
+        prepared = aligned((len(parameters), max(1, self.layout.prepared), self.lanes))
+        self._native("prepare", parameters, prepared, len(parameters))
+        return prepared
+
+    def fly(self, state: Array, prepared: Array, shared: Array, own: Array | None, signals: Array | None) -> None:
+        """Take the state as many steps further as there are rows of the shared inputs, in place.
+
+        Parameters
+        ----------
+        state : ndarray, shape (groups, rows of the state, lanes)
+        prepared : ndarray
+            From `prepare`.
+        shared : ndarray, shape (steps, shared rows)
+        own : ndarray, shape (groups, steps, own rows, lanes), or None
+        signals : ndarray, shape (groups, steps, rows of the signals, lanes), or None
+            Written here, where the program has signals.
+        """
+        own, out = (_NOTHING if part is None else part for part in (own, signals))
+        self._native("fly", state, prepared, shared, own, out, len(state), len(shared))
+
+
+class Machines(NamedTuple):
+    """Finds the programs of one closed loop when they are first needed."""
+
+    batch: Batch
+
+    def get(self, with_signals: bool) -> Machine:
+        """The program with or without signals, compiled if it is not yet."""
+        name = cache.key(self.batch.loop, native.compiler(), "recording" if with_signals else "quiet")
+        if name.digest not in _LOADED:
+            _LOADED[name.digest] = Machine(cache.get(name, lambda: self._compile(with_signals)))
+        return _LOADED[name.digest]
+
+    def _compile(self, with_signals: bool) -> Compiled:
+        with Busy("compiling the closed loop (once for its parts, then kept)"):
+            written = program(trace(self.batch), native.lanes(), with_signals)
+            return Compiled(native.compile_text(written.text), written.layout, dict(written.operations))
+
+
+def aligned(shape: tuple[int, ...]) -> Array:
+    """An array of zeros that begins where a vector may be loaded at once, on a line of the cache."""
+    count = int(np.prod(shape))
+    raw = np.zeros(count + 8)
+    skipped = (-raw.ctypes.data // 8) % 8
+    return raw[skipped : skipped + count].reshape(shape)
+
+
+def grouped(rows: Array, lanes: int) -> Array:
+    """Rows of flights (rows, N) in the machine's layout (groups, rows, lanes).
+
+    Spare lanes fly the last flight again: zeros could cost time in denormal arithmetic.
+    """
+    groups = -(-rows.shape[1] // lanes)
+    padded = np.pad(rows, ((0, 0), (0, groups * lanes - rows.shape[1])), mode="edge")
+    out = aligned((groups, len(rows), lanes))
+    out[:] = padded.reshape(len(rows), groups, lanes).transpose(1, 0, 2)
+    return out
+
+
+def ungrouped(groups: Array, flights: int) -> Array:
+    """The rows (rows, N) of the machine's layout."""
+    return np.ascontiguousarray(groups.transpose(1, 0, 2).reshape(groups.shape[1], -1)[:, :flights])

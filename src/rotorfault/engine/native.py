@@ -1,0 +1,72 @@
+"""Machine code from LLVM's intermediate language, by llvmlite, for the processor at hand."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@lru_cache(maxsize=1)
+def lanes() -> int:
+    """Doubles in a vector register of this processor."""
+    features = llvm.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+@lru_cache(maxsize=1)
+def compiler() -> str:
+    """Version of the compiler, and the processor that it compiles for."""
+    version = ".".join(map(str, llvm.llvm_version_info))
+    return f"LLVM {version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+@lru_cache(maxsize=1)
+def _machine() -> Any:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3, jit=True
+    )
+
+
+def compile_text(text: str) -> bytes:
+    """Object code of a module."""
+    machine = _machine()
+    module = llvm.parse_assembly(f'target triple = "{machine.triple}"\n{text}')
+    module.verify()
+    return bytes(machine.emit_object(module))
+
+
+class Native:
+    """Functions of object code, to be called with arrays and whole numbers; a call lets other threads run.
+
+    Parameters
+    ----------
+    code : bytes
+    functions : sequence of (name, number of arrays, number of whole numbers)
+    """
+
+    def __init__(self, code: bytes, functions: Sequence[tuple[str, int, int]]) -> None:
+        _machine()
+        self._jit = llvm.create_lljit_compiler()
+        names = [name for name, _, _ in functions]
+        builder = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+        for name in names:
+            builder = builder.export_symbol(name)
+        self._library = builder.link(self._jit, "rotorfault")
+        self._functions = {}
+        for name, arrays, numbers in functions:
+            kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arrays, *[ctypes.c_int64] * numbers)
+            self._functions[name] = kind(self._library[name])
+
+    def __call__(self, name: str, *arguments: Array | int) -> None:
+        """Call a function; arrays must be contiguous."""
+        self._functions[name](*(a.ctypes.data if isinstance(a, np.ndarray) else a for a in arguments))

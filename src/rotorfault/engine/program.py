@@ -1,0 +1,259 @@
+"""The program of a closed loop: traced once, divided into what is computed per flight and what is computed per step.
+
+Memory is laid out by groups of as many flights as a vector has lanes; within a group each row is one vector:
+
+    state[group][row][lane]          parameters[group][row][lane]
+    own[group][step][row][lane]      inputs of single flights: random numbers
+    out[group][step][row][lane]      signals, where they are wanted
+    shared[step][row]                inputs that all flights share: the reference
+
+One call takes some groups some steps further, each group through all the steps before the next, so that its state and
+parameters stay in the cache next to the processor.
+
+With one or two integration steps in a sampling period the whole period is one piece of straight code. With more its
+length, and the time to compile it, would grow with their number: then the sampling instant and one integration step
+are a piece each, and the second runs in a loop.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from rotorfault.engine.batch import Batch, as_drive, drive_template
+from rotorfault.engine.emit import Code, Emitter, Leaf, declarations, merging
+from rotorfault.engine.trace import Tape, Term
+from rotorfault.geometry import PerRotor, zeros
+from rotorfault.records import flatten, leaf_names, unflatten
+from rotorfault.signals import Command, Reference
+
+MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
+
+
+class Layout(NamedTuple):
+    """Sizes that the caller of a program needs, in rows."""
+
+    parameters: int  # that `prepare` reads
+    prepared: int  # that it writes and `fly` reads
+    state: int
+    over: int  # row of the state that is not 0 once the flight is over
+    shared: int
+    own: int
+    signals: int
+
+
+class Section(NamedTuple):
+    """A piece of straight code: what it writes where, and all that could be wanted of its trace."""
+
+    tape: Tape
+    writes: list[tuple[str, int, Term]]  # pointer, row, value
+    signals: list[Term]
+
+
+class Traced(NamedTuple):
+    """A closed loop as terms."""
+
+    sections: tuple[Section, ...]  # one, or the sampling instant and one integration step
+    substeps: int
+    layout: Layout  # without `prepared`
+
+
+class Program(NamedTuple):
+    """What is compiled."""
+
+    text: str  # LLVM's intermediate language, with the functions `prepare` and `fly`
+    layout: Layout
+    operations: Counter[str]  # of one step, by sort
+
+
+def trace(batch: Batch) -> Traced:
+    """Run the closed loop of a batch once, on terms."""
+    loop, template = batch.loop, drive_template(batch)
+    rows = len(flatten(template))
+    shared = rows if isinstance(template, Reference) else len(flatten(template.reference))
+    names = leaf_names(batch.state)
+    layout = Layout(
+        parameters=len(flatten(batch.parameters)),
+        prepared=0,
+        state=len(names),
+        over=names.index("scores.over"),
+        shared=shared,
+        own=rows - shared,
+        signals=0,
+    )
+    tape = Tape()
+    drive = as_drive(unflatten(template, [*tape.leaves("shared", shared), *tape.leaves("own", layout.own)]))
+    state, parameters = _symbols(tape, "state", batch.state), _symbols(tape, "par", batch.parameters)
+    if loop.plant.substeps <= MOST_IN_ONE:
+        after, signals = loop.step(state, drive, parameters)
+        writes = [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(after))]
+        only = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
+        return Traced((only,), 1, layout._replace(signals=len(only.signals)))
+
+    memory, scores, command, signals = loop.decide(state, drive, parameters)
+    decided = flatten((memory, scores, state.steps + 1.0))
+    first = layout.state - len(decided)
+    kept = flatten((command, state.steps * parameters.period))
+    writes = [("%state", first + row, tape.lift(x)) for row, x in enumerate(decided)]
+    writes += [("%kept", row, tape.lift(x)) for row, x in enumerate(kept)]
+    instant = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
+
+    tape = Tape()
+    plant, parameters = _symbols(tape, "state", batch.state.plant), _symbols(tape, "par", batch.parameters)
+    command, start = unflatten((Command(PerRotor.all(0.0), zeros()), 0.0), tape.leaves("kept", len(kept)))
+    dt = parameters.period * (1.0 / loop.plant.substeps)
+    moved = loop.plant.substep(plant, command, start + tape.term("count", 0) * dt, parameters.plant, dt)
+    move = Section(tape, [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(moved))], [])
+    return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
+
+
+def _symbols(tape: Tape, kind: str, record: Any) -> Any:
+    return unflatten(record, tape.leaves(kind, len(flatten(record))))
+
+
+def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
+    """Write the program of a closed loop.
+
+    Parameters
+    ----------
+    traced : Traced
+    lanes : int
+        Flights in a vector.
+    with_signals : bool
+        Whether every step writes its signals.
+    """
+    leaves = {
+        "par": Leaf("%par"), "state": Leaf("%state"), "kept": Leaf("%kept"), "own": Leaf("%own"),
+        "shared": Leaf("%shared", one_for_all=True), "count": Leaf("%count", in_register=True),
+    }  # fmt: skip
+    before, pieces, prepared = Code(lanes, "p"), [], 0
+    for number, section in enumerate(traced.sections):
+        wanted = section.signals if with_signals else []
+        writes = [*section.writes, *(("%out", row, term) for row, term in enumerate(wanted))]
+        merged = merging(section.tape.terms, [*(term for _, _, term in section.writes), *section.signals])
+        fixed = _fixed(term for _, _, term in writes)
+        emitter = Emitter(before, {"par": Leaf("%par")}, {}, merged)
+        for row, term in enumerate(fixed):
+            before.store(emitter.number(term), "%out", (prepared + row) * lanes)
+        code = Code(lanes, f"s{number}v")
+        emitter = Emitter(code, leaves, {term.index: prepared + row for row, term in enumerate(fixed)}, merged)
+        named = [(pointer, row, emitter.number(term)) for pointer, row, term in writes]
+        for pointer, row, name in named:  # last of all: nothing of the step may read what it writes
+            code.store(name, pointer, row * lanes)
+        pieces.append(code)
+        prepared += len(fixed)
+
+    layout = traced.layout._replace(prepared=prepared)
+    kept = max((row + 1 for pointer, row, _ in traced.sections[0].writes if pointer == "%kept"), default=1)
+    text = _MODULE.format(
+        declarations="\n".join(declarations(lanes)),
+        prepare="\n".join(before.lines),
+        step=_body(pieces, traced.substeps),
+        latch="step" if len(pieces) == 1 else "moved",
+        raw=layout.parameters * lanes,
+        prepared=prepared * lanes,
+        state=layout.state * lanes,
+        own=layout.own * lanes,
+        out=layout.signals * lanes if with_signals else 0,
+        shared=layout.shared,
+        kept=kept * lanes,
+    )
+    operations = Counter(pieces[0].counts)
+    for piece in pieces[1:]:
+        for sort, count in piece.counts.items():
+            operations[sort] += count * traced.substeps
+    return Program(text, layout, operations)
+
+
+def _body(pieces: list[Code], substeps: int) -> str:
+    if len(pieces) == 1:
+        return "\n".join(pieces[0].lines)
+    instant, move = pieces
+    return "\n".join(
+        [
+            *instant.lines,
+            "  br label %move",
+            "move:",
+            "  %m = phi i64 [ 0, %step ], [ %m1, %move ]",
+            "  %count = sitofp i64 %m to double",
+            *move.lines,
+            "  %m1 = add i64 %m, 1",
+            f"  %onward = icmp slt i64 %m1, {substeps}",
+            "  br i1 %onward, label %move, label %moved",
+            "moved:",
+        ]
+    )
+
+
+def _fixed(outputs: Iterable[Term]) -> list[Term]:
+    """Terms that change with the flight only and that something that moves, or an output, needs."""
+    found: dict[int, Term] = {}
+    seen: set[int] = set()
+    todo = list(outputs)
+    while todo:
+        term = todo.pop()
+        if term.index in seen:
+            continue
+        seen.add(term.index)
+        if term.level == 1:
+            found[term.index] = term
+        elif term.level == 2:
+            todo += [arg for arg in term.args if isinstance(arg, Term)]
+    return [found[index] for index in sorted(found)]
+
+
+_MODULE = """
+{declarations}
+
+define void @prepare(ptr noalias readonly %par0, ptr noalias %out0, i64 %groups) {{
+entry:
+  br label %each
+each:
+  %g = phi i64 [ 0, %entry ], [ %g1, %each ]
+  %par_at = mul i64 %g, {raw}
+  %par = getelementptr inbounds double, ptr %par0, i64 %par_at
+  %out_at = mul i64 %g, {prepared}
+  %out = getelementptr inbounds double, ptr %out0, i64 %out_at
+{prepare}
+  %g1 = add i64 %g, 1
+  %more = icmp slt i64 %g1, %groups
+  br i1 %more, label %each, label %done
+done:
+  ret void
+}}
+
+define void @fly(ptr noalias %state0, ptr noalias readonly %par0, ptr noalias readonly %shared0,
+                 ptr noalias readonly %own0, ptr noalias %out0, i64 %groups, i64 %steps) {{
+entry:
+  %kept = alloca [{kept} x double], align 64
+  br label %each
+each:
+  %g = phi i64 [ 0, %entry ], [ %g1, %next ]
+  %state_at = mul i64 %g, {state}
+  %state = getelementptr inbounds double, ptr %state0, i64 %state_at
+  %par_at = mul i64 %g, {prepared}
+  %par = getelementptr inbounds double, ptr %par0, i64 %par_at
+  %before = mul i64 %g, %steps
+  br label %step
+step:
+  %k = phi i64 [ 0, %each ], [ %k1, %{latch} ]
+  %here = add i64 %before, %k
+  %own_at = mul i64 %here, {own}
+  %own = getelementptr inbounds double, ptr %own0, i64 %own_at
+  %out_at = mul i64 %here, {out}
+  %out = getelementptr inbounds double, ptr %out0, i64 %out_at
+  %shared_at = mul i64 %k, {shared}
+  %shared = getelementptr inbounds double, ptr %shared0, i64 %shared_at
+{step}
+  %k1 = add i64 %k, 1
+  %again = icmp slt i64 %k1, %steps
+  br i1 %again, label %step, label %next
+next:
+  %g1 = add i64 %g, 1
+  %more = icmp slt i64 %g1, %groups
+  br i1 %more, label %each, label %done
+done:
+  ret void
+}}
+"""
