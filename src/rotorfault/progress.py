@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import time
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 PATIENCE = 2.0  # s before anything is shown
 
@@ -43,14 +45,20 @@ class Bar:
         if self._progress is None:
             if time.monotonic() - self._start < PATIENCE or not sys.stderr.isatty():
                 return
-            self._progress = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {self.unit}"),
-                TimeRemainingColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
+            self._progress = _progress(self.unit)
             self._progress.start()
             self._task = self._progress.add_task(self.title, total=self.total)  # type: ignore[assignment]
         self._progress.update(self._task, completed=done)  # type: ignore[arg-type]
+
+
+def _progress(unit: str) -> Progress:
+    # rich is loaded for a bar that is shown; most computations are done before.
+    rich, console = (importlib.import_module(f"rich.{name}") for name in ("progress", "console"))
+    return rich.Progress(  # type: ignore[no-any-return]
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
+        rich.TimeRemainingColumn(),
+        console=console.Console(stderr=True),
+        transient=True,
+    )
