@@ -6,19 +6,21 @@ speeds and tilt are those of the record before, the last one in the air. See `ro
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
+from rotorfault.flight_data import Records
 from rotorfault.telemetry import SIGNAL_NAMES
 
 SPEED_MAX = 1.0  # m/s, downwards: as after a fall from 5 cm
 SLIDE_MAX = 0.5  # m/s, horizontal
 TILT_MAX = 0.2617993877991494  # rad: 15 degrees
 REST = 0.5  # s that it must stand with rotors stopped; then the flight is over
+
+Data = TypeVar("Data", bound=Records)
 
 _ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
 
@@ -59,18 +61,18 @@ def rested(signals: Array, times: Array) -> int | None:
     return int(done[0]) if len(done) else None
 
 
-def touch_record(data: xr.Dataset) -> int | None:
+def touch_record(data: Records) -> int | None:
     """Record of the touch-down, or None."""
     hit = np.flatnonzero((data["landing_stage"].values > 0.5) & (data["ground_force"].values > 0.0))
     return int(hit[0]) if len(hit) else None
 
 
-def landing(data: xr.Dataset) -> dict[str, Any] | None:
+def landing(data: Records) -> dict[str, Any] | None:
     """Numbers of a landing, None if none was begun.
 
     Parameters
     ----------
-    data : xarray.Dataset
+    data : Records
         Up to the end of the flight.
     """
     if "landing_stage" not in data:
@@ -104,7 +106,7 @@ def landing(data: xr.Dataset) -> dict[str, Any] | None:
     return found
 
 
-def in_the_air(data: xr.Dataset) -> xr.Dataset:
+def in_the_air(data: Data) -> Data:
     """The records before touch-down; all of them where there was none."""
     touch = touch_record(data) if "landing_stage" in data else None
     return data if touch is None else data.isel(time=slice(0, max(touch, 1)))
