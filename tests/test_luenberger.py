@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import place_poles
 
 from rotorfault.assembly import assemble
 from rotorfault.config import validate
@@ -126,6 +127,21 @@ def test_place_is_a_solution_for_any_channel() -> None:
     A = np.array([[1.0, 2e-3], [0.0, 0.9]])
     found = np.linalg.eigvals(A @ (np.eye(2) - np.array([[L1, 0.0], [L2, 0.0]])))
     np.testing.assert_allclose(np.sort(found), [0.3, 0.7], atol=1e-12)
+
+
+def test_place_agrees_with_scipy() -> None:
+    """Against SciPy's placement of A' with A L as the gain, over channels and poles of all sizes."""
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        T, w = 10.0 ** random.uniform(-4.0, -1.5), 10.0 ** random.uniform(0.5, 2.5)
+        decay = math.exp(-w * T) if random.random() < 0.5 else 1.0
+        carry = T if decay == 1.0 else (1.0 - decay) / w
+        p = math.exp(-random.uniform(0.01, 3.0))
+        q = p * random.uniform(0.05, 0.95)
+        A = np.array([[1.0, carry], [0.0, decay]])
+        gain = place_poles(A.T, np.array([[1.0], [0.0]]), [p, q]).gain_matrix
+        expected = np.linalg.solve(A, gain.T)[:, 0]
+        np.testing.assert_allclose(place(carry, decay, (p, q)), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

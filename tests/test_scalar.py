@@ -79,7 +79,9 @@ def on_casadi(function: Callable[..., Any], rows: np.ndarray) -> np.ndarray:
 
 
 ENGINES = pytest.mark.parametrize(
-    "engine", [on_floats, on_arrays, on_terms, on_heyoka, on_casadi], ids=["floats", "arrays", "terms", "heyoka", "casadi"]
+    "engine",
+    [on_floats, on_arrays, on_terms, on_heyoka, on_casadi],
+    ids=["floats", "arrays", "terms", "heyoka", "casadi"],
 )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from rotorfault import dataset
 from rotorfault.allocation import ALLOCATORS
 from rotorfault.config import parse_toml, read_text
 from rotorfault.control import CONTROLLERS, RESPONSES
@@ -106,6 +106,8 @@ def check(path: Path) -> str:
         If anything in it is wrong.
     """
     if path.suffix == ".nc":
+        # xarray takes longer to load than all the rest, and only flight files need it.
+        dataset = importlib.import_module("rotorfault.dataset")
         data = dataset.read_netcdf(path)
         scenario = scenario_from(dataset.configuration(data, path), str(path))
         return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"

@@ -93,7 +93,7 @@ def fly(
     folder = out or Path("results") / f"{checked.name}-{label}".replace("/", "_")
     _load("files").output_folder(folder)
     if own is None or isinstance(own, str):
-        for warning in _load("trim").sampled_data_warnings(checked):
+        for warning in _load("sampled_data").sampled_data_warnings(checked):
             typer.echo(f"warning: {warning}", err=True)
     for number, fault in enumerate(checked.fault):
         onset = getattr(fault.settings, "time", getattr(fault.settings, "start", 0.0))

@@ -8,25 +8,17 @@ from __future__ import annotations
 
 import io
 import json
-import platform
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from rotorfault._version import __version__
 from rotorfault.engine.batch import Array
 from rotorfault.errors import InputError
 from rotorfault.files import in_folder, write_atomically
-from rotorfault.geometry import Mat3, PerRotor, Vec3
-from rotorfault.telemetry import RPY, quantities
+from rotorfault.flight_data import FORMAT, FlightData, flight_data
+from rotorfault.telemetry import quantities
 
-AXES = ["x", "y", "z"]
-ANGLES = ["roll", "pitch", "yaw"]
-_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "heyoka")
-FORMAT = "rotorfault-flight-1"
 ATTRIBUTES = (
     "scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "thrust_min", "thrust_max",
 )  # fmt: skip
@@ -44,46 +36,16 @@ def dataset(signals: Array, times: Array, attributes: dict[str, Any]) -> xr.Data
     attributes : dict
         Attributes of the dataset.
     """
-    variables: dict[str, Any] = {}
-    row = 0
-    for name, (kind, quantity) in quantities().items():
-        dims, shape = _shape(kind, quantity.frame == RPY)
-        width = int(np.prod(shape, dtype=int))
-        values = signals[:, row : row + width].reshape(len(times), *shape)
-        row += width
-        about = {"units": quantity.unit, "long_name": quantity.meaning}
-        if quantity.frame:
-            about["frame"] = quantity.frame
-        variables[name] = (("time", *dims), values, about)
-    coordinates = {
-        "time": ("time", times, {"units": "s", "long_name": "time since the start of the flight"}),
-        "axis": AXES,
-        "angle": ANGLES,
-        "angle_2": ANGLES,
-        "rotor": ("rotor", [1, 2, 3, 4], {"long_name": "1 front, 2 rear, 3 right, 4 left on a plus vehicle"}),
-    }
-    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+    return as_dataset(flight_data(signals, times, attributes))
 
 
-def _shape(kind: type, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    if kind is Vec3:
-        return ("angle" if angular else "axis",), (3,)
-    if kind is PerRotor:
-        return ("rotor",), (4,)
-    if kind is Mat3:
-        return ("angle", "angle_2"), (3, 3)
-    return (), ()
-
-
-def versions() -> dict[str, str]:
-    """Versions of rotorfault, Python and the libraries that numbers depend on."""
-    found = {"rotorfault": __version__, "python": platform.python_version()}
-    for library in _LIBRARIES:
-        try:
-            found[library] = metadata.version(library)
-        except metadata.PackageNotFoundError:
-            found[library] = "not installed"
-    return found
+def as_dataset(data: FlightData) -> xr.Dataset:
+    """The same records as a dataset, on the same memory."""
+    return xr.Dataset(
+        {name: tuple(variable) for name, variable in data.variables.items()},
+        coords={name: tuple(variable) for name, variable in data.coordinates.items()},
+        attrs=data.attrs,
+    )
 
 
 def write_netcdf(data: xr.Dataset, path: Path) -> None:

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
-from rotorfault import dataset
 from rotorfault._version import __version__
 from rotorfault.assembly import assemble, assemble_all
 from rotorfault.control.python_controller import as_controller
@@ -20,14 +18,18 @@ from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch, Recording
 from rotorfault.errors import InputError
 from rotorfault.files import in_folder, output_folder, write_atomically
+from rotorfault.flight_data import FORMAT, FlightData, flight_data
 from rotorfault.metrics import Outcome, finite_or_none, judge, summary
+from rotorfault.netcdf import write_netcdf
 from rotorfault.progress import Bar
 from rotorfault.records import unflatten
 from rotorfault.report.text import summary_text
 from rotorfault.scenario import Scenario, load_scenario, override, scenario_from
 from rotorfault.scoring import KINDS
+from rotorfault.versions import versions
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -45,25 +47,36 @@ class Flight:
     ----------
     scenario : Scenario or None
         What was flown; None for a flight that cannot be built anew (read from a file of another version).
-    data : xarray.Dataset
-        One variable per signal over ``time`` [s], up to the end of the flight; units and frames in attributes.
     outcome : Outcome
         How and when it ended.
     """
 
-    def __init__(self, data: xr.Dataset, outcome: Outcome, scenario: Scenario | None = None) -> None:
-        self.data, self.outcome, self.scenario = data, outcome, scenario
+    def __init__(self, data: xr.Dataset | FlightData, outcome: Outcome, scenario: Scenario | None = None) -> None:
+        self._data, self.outcome, self.scenario = data, outcome, scenario
+
+    @property
+    def data(self) -> xr.Dataset:
+        """One variable per signal over ``time`` [s], up to the end of the flight; units and frames in attributes."""
+        # From the first look on the dataset is the flight, for who has it may change it.
+        if isinstance(self._data, FlightData):
+            made: xr.Dataset = _dataset().as_dataset(self._data)
+            self._data = made
+        return self._data
+
+    @data.setter
+    def data(self, data: xr.Dataset) -> None:
+        self._data = data
 
     @property
     def label(self) -> str:
         """Controller and preset, to tell flights of one scenario apart."""
-        return str(self.data.attrs["controller"])
+        return str(self._data.attrs["controller"])
 
     def summary(self) -> Summary:
         """All numbers of the flight; see `rotorfault.metrics` for their definitions."""
-        attributes = self.data.attrs
+        attributes = self._data.attrs
         limits = (float(attributes["thrust_min"]), float(attributes["thrust_max"]))
-        found = finite_or_none(summary(self.data, self.outcome, limits))
+        found = finite_or_none(summary(self._data, self.outcome, limits))
         names = ("scenario", "controller", "plant", "engine")
         about = {name: str(attributes[name]) for name in names}
         return Summary(**about, seed=int(attributes["seed"]), version=str(attributes["version"]), **found)
@@ -110,8 +123,12 @@ class Flight:
         InputError
             If the folder does not exist.
         """
-        dataset.write_netcdf(self.data, Path(path))
-        return Path(path)
+        path = Path(path)
+        if isinstance(self._data, FlightData):
+            write_netcdf(self._data, path)
+        else:
+            _dataset().write_netcdf(self._data, path)
+        return path
 
     def write(self, folder: str | Path, with_figures: bool = True) -> list[Path]:
         """Write ``flight.nc``, ``summary.json`` and the figures into a folder.
@@ -128,6 +145,11 @@ class Flight:
         if with_figures:
             written += _figures().save(self.plot(), folder)
         return written
+
+
+def _dataset() -> Any:
+    # So does xarray, for a while longer than a flight; only who looks at the data or reads a file needs it.
+    return importlib.import_module("rotorfault.dataset")
 
 
 def _figures() -> Any:
@@ -231,6 +253,7 @@ def repeat(path: str | Path, engine: str | None = None) -> Flight:
     InputError
         If the file cannot be read, or was flown by a controller or reference that is not in it.
     """
+    dataset = _dataset()
     data = dataset.read_netcdf(path)
     if data.attrs.get("own_controller"):
         raise InputError(
@@ -249,6 +272,7 @@ def load(path: str | Path) -> Flight:
     InputError
         If the file is missing, truncated or no flight, or lacks a signal.
     """
+    dataset = _dataset()
     data = dataset.complete(dataset.read_netcdf(path), path)
     return Flight(data, Outcome(str(data.attrs["outcome"]), float(data.attrs["end_time"])))
 
@@ -264,7 +288,9 @@ def _run(batch: Batch, engine: str, scenarios: Sequence[Scenario]) -> Recording:
         return load_engine(engine)(batch, watch)
 
 
-def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, engine: str, own: str | None) -> Flight:
+def _flight(
+    scenario: Scenario, recording: Recording, batch: Batch, index: int, engine: str, own: str | None
+) -> Flight:
     scores = unflatten(batch.state, recording.state[:, index].tolist()).scores
     signals, times = recording.signals[:, :, index], recording.steps * scenario.period
     kind = KINDS[int(scores.over)]
@@ -279,7 +305,7 @@ def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, 
         outcome = Outcome("interrupted", float(times[-1])) if recording.interrupted else Outcome("offset", whole)
     vehicle = scenario.vehicle.vehicle
     attributes = {
-        "format": dataset.FORMAT,
+        "format": FORMAT,
         "title": f"{scenario.name} flown by {own or scenario.controller.kind}",
         "scenario": scenario.name,
         "controller": own or scenario.controller.kind,
@@ -289,13 +315,13 @@ def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, 
         "engine": engine,
         "seed": scenario.seed,
         "version": __version__,
-        "versions": json.dumps(dataset.versions()),
+        "versions": json.dumps(versions()),
         "thrust_min": vehicle.thrust_min,
         "thrust_max": vehicle.thrust_max,
         "threshold": float(getattr(getattr(scenario.diagnosis.settings, "decision", None), "threshold", 0.0)),
         "configuration": json.dumps(scenario.as_tables()),
     }
-    data = dataset.dataset(signals[:end], times[:end], attributes)
+    data = flight_data(signals[:end], times[:end], attributes)
     if outcome.kind == "offset":
         outcome = Outcome(judge(data), outcome.time)
     data.attrs |= {"outcome": outcome.kind, "end_time": outcome.time}

@@ -29,10 +29,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
+from rotorfault.flight_data import Records
 from rotorfault.scoring import ERROR_FLOOR, FAR, SETTLED, TRACKED
 from rotorfault.scoring import bands as bands_of
 from rotorfault.telemetry import SIGNAL_NAMES
@@ -82,17 +82,17 @@ def first_loss(signals: Array, ground: float | None) -> tuple[int, str] | None:
     return min(found, key=lambda item: item[0]) if found else None
 
 
-def bands(data: xr.Dataset, share: float) -> NDArray[np.float64]:
+def bands(data: Records, share: float) -> NDArray[np.float64]:
     """Half width per axis [m] within which an error counts as small."""
     return bands_of(data["position_reference"].values, data["position"].values[0], share)
 
 
-def constant_reference(data: xr.Dataset) -> bool:
+def constant_reference(data: Records) -> bool:
     """Whether the position reference never moves."""
     return bool((np.ptp(data["position_reference"].values, axis=0) == 0.0).all())
 
 
-def judge(data: xr.Dataset) -> str:
+def judge(data: Records) -> str:
     """Outcome of a flight that flew to its end: settled, tracked, offset or landed."""
     if "landing_stage" in data and data["landing_stage"].values[-1] > 1.5 and data["ground_force"].values[-1] > 0.0:
         return "landed"
@@ -103,7 +103,7 @@ def judge(data: xr.Dataset) -> str:
     return "tracked" if (np.sqrt(np.mean(half**2, axis=0)) <= bands(data, TRACKED)).all() else "offset"
 
 
-def settle_times(data: xr.Dataset) -> dict[str, float | None]:
+def settle_times(data: Records) -> dict[str, float | None]:
     """Settling time per axis and overall in s; None where it never settles."""
     time = data["time"].values
     # "Not inside", so that NaN counts as outside.
@@ -120,7 +120,7 @@ def settle_times(data: xr.Dataset) -> dict[str, float | None]:
     return found
 
 
-def attitude_error(data: xr.Dataset, against: str) -> NDArray[np.float64]:
+def attitude_error(data: Records, against: str) -> NDArray[np.float64]:
     """Attitude error in rad, wrapped, shape (records, 3), against 'reference' or 'demand'."""
     attitude = data["attitude"].values
     if against == "demand":
@@ -133,7 +133,7 @@ def attitude_error(data: xr.Dataset, against: str) -> NDArray[np.float64]:
 
 
 def cost(
-    data: xr.Dataset,
+    data: Records,
     *,
     against: str = "reference",
     inputs: str = "torque",
@@ -164,7 +164,7 @@ def cost(
     return float(0.5 * np.trapezoid(state + effort, data["time"].values))
 
 
-def detections(data: xr.Dataset) -> list[dict[str, Any]]:
+def detections(data: Records) -> list[dict[str, Any]]:
     """One entry for each rotor that truly lost thrust."""
     time = data["time"].values
     found = []
@@ -193,31 +193,31 @@ def detections(data: xr.Dataset) -> list[dict[str, Any]]:
     return found
 
 
-def false_alarms(data: xr.Dataset) -> int:
+def false_alarms(data: Records) -> int:
     """How often a rotor was flagged that had lost nothing at that time."""
     return int(np.sum(_raised(data) & (data["loss_true"].values == 0.0)))
 
 
-def _raised(data: xr.Dataset) -> NDArray[np.bool_]:
+def _raised(data: Records) -> NDArray[np.bool_]:
     """Whether the flag of each rotor rises in each record, shape (records, 4)."""
     flags = data["fault_flag"].values > 0.5
     return np.asarray(flags & ~np.vstack([np.zeros((1, 4), dtype=bool), flags[:-1]]))
 
 
-def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> dict[str, Any]:
+def summary(data: Records, outcome: Outcome, limits: tuple[float, float]) -> dict[str, Any]:
     """All numbers of a flight, JSON-ready.
 
     Parameters
     ----------
-    data : xarray.Dataset
+    data : Records
         Up to the end of the flight.
     outcome : Outcome
     limits : (2,) float
         Least and largest thrust of a rotor in N.
     """
     whole, data = data, in_the_air(data)
-    grounded = len(data["time"]) < len(whole["time"])
-    last = whole.isel(time=[-1])
+    grounded = len(data["time"].values) < len(whole["time"].values)
+    error_end = whole["position"].values[-1] - whole["position_reference"].values[-1]
     command = data["thrust_command"].values
     error = data["position"].values - data["position_reference"].values
     attitude = data["attitude"].values
@@ -233,8 +233,8 @@ def summary(data: xr.Dataset, outcome: Outcome, limits: tuple[float, float]) -> 
         "position_mse": _per(_AXES, np.mean(error**2, axis=0)),
         "attitude_mse": _per(_ANGLES, np.mean(attitude_error(data, "reference") ** 2, axis=0)),
         "attitude_demand_mse": _per(_ANGLES, np.mean(attitude_error(data, "demand") ** 2, axis=0)),
-        "position_error_end": _per(_AXES, (last["position"] - last["position_reference"]).values[0]),
-        "attitude_end": _per(_ANGLES, last["attitude"].values[0]),
+        "position_error_end": _per(_AXES, error_end),
+        "attitude_end": _per(_ANGLES, whole["attitude"].values[-1]),
         "cost": cost(data),
         "tilt_max": float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
         "attitude_max": _per(_ANGLES, np.abs(attitude).max(axis=0)),
@@ -255,13 +255,13 @@ def _per(names: tuple[str, ...], values: NDArray[np.float64]) -> dict[str, float
     return {name: float(value) for name, value in zip(names, values, strict=True)}
 
 
-def _outside(data: xr.Dataset) -> NDArray[np.bool_]:
+def _outside(data: Records) -> NDArray[np.bool_]:
     """Which of the six axes are outside their boundary layer, shape (records, 6)."""
     parts = [data[f"outside_layer_{group}"].values > 0.5 for group in ("position", "attitude")]
     return np.hstack(parts)
 
 
-def lyapunov_violations(data: xr.Dataset) -> float | None:
+def lyapunov_violations(data: Records) -> float | None:
     """Share of the steps of an axis outside its layer in which its sigma^2 / 2 rises; None if there are none.
 
     In the ideal setting (no lag, no limits, bounded disturbance, continuous time) it would be 0: (27)-(29).

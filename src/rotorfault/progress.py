@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import time
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 PATIENCE = 2.0  # s before anything is shown
 
@@ -43,17 +45,23 @@ class Bar:
         if self._progress is None:
             if time.monotonic() - self._start < PATIENCE or not sys.stderr.isatty():
                 return
-            self._progress = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {self.unit}"),
-                TimeRemainingColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
+            self._progress = _progress(self.unit)
             self._progress.start()
             self._task = self._progress.add_task(self.title, total=self.total)  # type: ignore[assignment]
         self._progress.update(self._task, completed=done)  # type: ignore[arg-type]
+
+
+def _progress(unit: str) -> Progress:
+    # rich is loaded for a bar that is shown; most computations are done before.
+    rich, console = (importlib.import_module(f"rich.{name}") for name in ("progress", "console"))
+    return rich.Progress(  # type: ignore[no-any-return]
+        rich.TextColumn("{task.description}"),
+        rich.BarColumn(),
+        rich.TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
+        rich.TimeRemainingColumn(),
+        console=console.Console(stderr=True),
+        transient=True,
+    )
 
 
 class Busy:
@@ -65,15 +73,18 @@ class Busy:
     """
 
     def __init__(self, what: str) -> None:
-        self._what, self._console = what, Console(stderr=True)
+        self._line = f"{what} ..."
 
     def __enter__(self) -> Busy:
-        if sys.stderr.isatty():
-            self._console.print(f"{self._what} ...", end="\r", style="dim", highlight=False)
+        self._show(self._line)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
+        self._show(" " * len(self._line))
+
+    @staticmethod
+    def _show(line: str) -> None:
         if sys.stderr.isatty():
-            self._console.print(" " * (len(self._what) + 4), end="\r")
+            print(line, end="\r", file=sys.stderr, flush=True)

@@ -27,7 +27,7 @@ from rotorfault.config import Strict, read_text, refusal
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
 from rotorfault.records import flatten
-from rotorfault.reference_csv import Curve, read_table
+from rotorfault.reference_csv import read_table
 from rotorfault.registry import Registry
 from rotorfault.signals import Reference
 
@@ -266,13 +266,15 @@ class Csv:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         columns = read_table(settings.text or "", settings.file)
+        # SciPy takes a third of a second to load, which a flight along any other reference need not spend.
+        curve = importlib.import_module("rotorfault.reference_curve").Curve
         self._axes = [
-            Curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
+            curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
             for axis, rate, acceleration in (("x", "vx", "ax"), ("y", "vy", "ay"), ("z", "vz", "az"))
         ]
         # A logged yaw jumps by a full turn at the border; the vehicle does not.
         yaw = np.unwrap(columns["yaw"]) if "yaw" in columns else np.zeros_like(columns["t"])
-        self._axes.append(Curve(columns["t"], yaw, columns.get("yaw_rate"), None))
+        self._axes.append(curve(columns["t"], yaw, columns.get("yaw_rate"), None))
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""

@@ -1,15 +1,13 @@
-"""Reference tables in CSV files: reading with line numbers in every complaint, and smooth interpolation."""
+"""Reference tables in CSV files: read with line numbers in every complaint."""
 
 from __future__ import annotations
 
 import csv
 import math
 from pathlib import Path
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BPoly, CubicSpline
 
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
@@ -89,34 +87,3 @@ def _numbers(row: list[str], names: list[str], where: str) -> list[float]:
             raise InputError(f"{where}: {name}: got '{cell.strip()[:40]}'; allowed: a finite number")
         numbers.append(number)
     return numbers
-
-
-@final
-class Curve:
-    """A smooth function of time through given values, and rates and accelerations where there are any.
-
-    Without rates a cubic spline, with rates a cubic and with accelerations a quintic polynomial between each two
-    instants, so that the tabulated derivatives are always those of the tabulated values.
-
-    Parameters
-    ----------
-    times, values : ndarray, shape (n,)
-    rates, accelerations : ndarray, shape (n,), or None
-        Accelerations only with rates.
-    """
-
-    def __init__(self, times: Array, values: Array, rates: Array | None, accelerations: Array | None) -> None:
-        self._first, self._last = float(times[0]), float(times[-1])
-        if rates is None:
-            curve = CubicSpline(times, values)
-        else:
-            given = [values, rates] if accelerations is None else [values, rates, accelerations]
-            curve = BPoly.from_derivatives(times, np.stack(given, axis=1))
-        self._derivatives = [curve, curve.derivative(1), curve.derivative(2)]
-
-    def evaluate(self, times: Array) -> Array:
-        """Value, rate and acceleration, shape (3, n); at rest before the first and after the last given instant."""
-        inside = (times >= self._first) & (times <= self._last)
-        result = np.stack([derivative(np.clip(times, self._first, self._last)) for derivative in self._derivatives])
-        result[1:, ~inside] = 0.0
-        return result

@@ -2,7 +2,8 @@
 
 Every equation of rotorfault is written once, on scalars, with ``+ - * /`` and the functions of this module. This
 is the only file that knows which number types exist: Python floats, NumPy arrays, the terms of
-`rotorfault.engine.trace`, heyoka expressions and CasADi SX. A function looks at *all* its arguments to choose the type, so that floats and symbols may be mixed.
+`rotorfault.engine.trace`, heyoka expressions and CasADi SX. A function looks at *all* its arguments to choose the
+type, so that floats and symbols may be mixed.
 
 Rules that every function keeps:
 

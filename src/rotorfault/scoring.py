@@ -190,7 +190,9 @@ class Scoring:
         """The scores with this instant in them."""
         error = signals.position - signals.position_reference
         square = error.times(error)
-        turn = Vec3(signals.attitude.x, signals.attitude.y, signals.attitude.z - signals.yaw_reference).map(wrap_angle)
+        turn = Vec3(signals.attitude.x, signals.attitude.y, signals.attitude.z - signals.yaw_reference).map(
+            wrap_angle
+        )
         late = greater_equal(step, parameters.half)
         rate = cost_rate(signals, error, turn)
         first = less(step, 0.5)
@@ -203,9 +205,7 @@ class Scoring:
         hit = signals.loss_true.map(lambda loss: greater(loss, 0.0))
         onset = scores.onset.map(lambda old, now: select(both(now, less(old, -0.5)), step, old), hit)
         detected = scores.detected.map(
-            lambda old, rises, began: select(
-                both(both(rises, greater(began, -0.5)), less(old, -0.5)), step, old
-            ),
+            lambda old, rises, began: select(both(both(rises, greater(began, -0.5)), less(old, -0.5)), step, old),
             raised,
             onset,
         )

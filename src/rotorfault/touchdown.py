@@ -6,15 +6,17 @@ speeds and tilt are those of the record before, the last one in the air. See `ro
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
+from rotorfault.flight_data import Records
 from rotorfault.scoring import REST, SLIDE_MAX, SPEED_MAX, TILT_MAX
 from rotorfault.telemetry import SIGNAL_NAMES
+
+Data = TypeVar("Data", bound=Records)
 
 _ROW = {name: k for k, name in enumerate(SIGNAL_NAMES)}
 
@@ -55,18 +57,18 @@ def rested(signals: Array, times: Array) -> int | None:
     return int(done[0]) if len(done) else None
 
 
-def touch_record(data: xr.Dataset) -> int | None:
+def touch_record(data: Records) -> int | None:
     """Record of the touch-down, or None."""
     hit = np.flatnonzero((data["landing_stage"].values > 0.5) & (data["ground_force"].values > 0.0))
     return int(hit[0]) if len(hit) else None
 
 
-def landing(data: xr.Dataset) -> dict[str, Any] | None:
+def landing(data: Records) -> dict[str, Any] | None:
     """Numbers of a landing, None if none was begun.
 
     Parameters
     ----------
-    data : xarray.Dataset
+    data : Records
         Up to the end of the flight.
     """
     if "landing_stage" not in data:
@@ -100,7 +102,7 @@ def landing(data: xr.Dataset) -> dict[str, Any] | None:
     return found
 
 
-def in_the_air(data: xr.Dataset) -> xr.Dataset:
+def in_the_air(data: Data) -> Data:
     """The records before touch-down; all of them where there was none."""
     touch = touch_record(data) if "landing_stage" in data else None
     return data if touch is None else data.isel(time=slice(0, max(touch, 1)))

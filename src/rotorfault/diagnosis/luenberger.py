@@ -28,9 +28,7 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple, final
 
-import numpy as np
 from pydantic import Field, field_validator
-from scipy.signal import place_poles
 
 from rotorfault.allocation.mixer import nominal_inverse
 from rotorfault.config import Strict
@@ -94,25 +92,32 @@ class LuenbergerMemory(NamedTuple):
 
 
 def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[float, float]:
-    """Current-observer gain of one channel, by SciPy's pole placement.
+    r"""Current-observer gain of one channel, in closed form.
+
+    After a measurement the error obeys (I - L C) A, which has the eigenvalues of A (I - L C). With c = carry and
+    d = decay that is
+
+    .. math:: \begin{pmatrix}1 & c\\ 0 & d\end{pmatrix}\begin{pmatrix}1 - L_1 & 0\\ -L_2 & 1\end{pmatrix} =
+              \begin{pmatrix}1 - L_1 - c L_2 & c\\ -d L_2 & d\end{pmatrix}
+
+    with determinant d (1 - L_1) and trace 1 - L_1 - c L_2 + d. Set equal to product and sum of the poles p and q:
+
+    .. math:: L_1 = 1 - \frac{p q}{d}, \qquad L_2 = \frac{(d - p)(d - q)}{c d}
 
     Parameters
     ----------
     carry, decay : float
-        The channel is [[1, carry], [0, decay]], its rate is measured.
+        The channel is [[1, carry], [0, decay]], its rate is measured; neither is 0.
     targets : (2,) float
-        Discrete poles of the estimation error.
+        Discrete poles p and q of the estimation error.
 
     Returns
     -------
     (2,) float
-        Innovation to rate, and to deviation.
+        L_1, innovation to rate, and L_2, to deviation.
     """
-    A = np.array([[1.0, carry], [0.0, decay]])
-    # The error of the current observer obeys A (I - L C): place for A' with A = predictor gain, then L = A^-1 gain.
-    predictor = place_poles(A.T, np.array([[1.0], [0.0]]), list(targets)).gain_matrix.T
-    gain = np.linalg.solve(A, predictor)
-    return float(gain[0, 0]), float(gain[1, 0])
+    p, q = targets
+    return 1.0 - p * q / decay, (decay - p) * (decay - q) / (carry * decay)
 
 
 @DIAGNOSES.register("luenberger")

@@ -14,7 +14,10 @@ from rotorfault.errors import InputError
 from rotorfault.registry import unknown
 
 ENGINES = {
-    "simd": ("rotorfault.engine.simd", "machine code by LLVM, vector lanes and threads; the default where llvmlite is installed"),
+    "simd": (
+        "rotorfault.engine.simd",
+        "machine code by LLVM: vector lanes, threads; the default",
+    ),
     "numpy": ("rotorfault.engine.arrays", "NumPy arrays: batches without a compiler; a single flight is slow"),
     "python": ("rotorfault.engine.python", "Python floats: any controller, easy to step through"),
 }
@@ -43,5 +46,5 @@ def load_engine(name: str) -> Engine:
     if name not in ENGINES:
         raise InputError(unknown("engine", name, list(ENGINES)))
     if name == "simd" and not have_simd():
-        raise InputError("engine 'simd' needs llvmlite, which is not installed; use --engine numpy or --engine python")
+        raise InputError("engine 'simd' needs llvmlite, not installed; use --engine numpy or --engine python")
     return cast("Engine", importlib.import_module(ENGINES[name][0]).run)

@@ -18,10 +18,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rotorfault.engine.emit import Code
+from rotorfault.engine.code import Code
 
 LARGEST_ANGLE = 1e14  # rad
 
@@ -104,9 +102,7 @@ def exponential(code: Code, x: str) -> str:
     shifted = code.fma(limited, code.constant(1.0 / math.log(2.0)), code.constant(_TO_INTEGER))
     minus_n = code.negative(code.op("fsub", shifted, code.constant(_TO_INTEGER)))
     r = code.fma(minus_n, code.constant(_LN2[1]), code.fma(minus_n, code.constant(_LN2[0]), limited))
-    value = code.op(
-        "fadd", code.fma(code.op("fmul", r, r), _polynomial(code, r, _EXP), r), code.constant(1.0)
-    )
+    value = code.op("fadd", code.fma(code.op("fmul", r, r), _polynomial(code, r, _EXP), r), code.constant(1.0))
     # The lowest bits of `shifted` hold n in two's complement; 2^n itself may be out of range where the result is not.
     n = code.integer_op("ashr", code.integer_op("shl", code.bits(shifted), code.integer(13)), code.integer(13))
     first = code.integer_op("ashr", n, code.integer(1))
@@ -139,14 +135,10 @@ def arc_tangent(code: Code, y: str, x: str) -> str:
     diagonal = code.select(both_infinite, both_infinite, above, kind="truth")
     angle = code.select(diagonal, from_diagonal, angle)
     steep = code.compare("ogt", ay, ax)
-    mirrored = code.op(
-        "fadd", code.constant(_HALF_PI[0]), code.op("fsub", code.constant(_HALF_PI[1]), angle)
-    )
+    mirrored = code.op("fadd", code.constant(_HALF_PI[0]), code.op("fsub", code.constant(_HALF_PI[1]), angle))
     angle = code.select(steep, mirrored, angle)
     backward = code.compare_integer("slt", code.bits(x), code.integer(0))
-    turned = code.op(
-        "fadd", code.constant(math.pi), code.op("fsub", code.constant(2.0 * _HALF_PI[1]), angle)
-    )
+    turned = code.op("fadd", code.constant(math.pi), code.op("fsub", code.constant(2.0 * _HALF_PI[1]), angle))
     angle = code.select(backward, turned, angle)
     return code.with_sign_of(angle, y)
 
@@ -165,7 +157,15 @@ def hyperbolic_tangent(code: Code, x: str) -> str:
     one = code.constant(1.0)
     far = code.op("fdiv", code.op("fsub", one, q), code.op("fadd", one, q))
     z = code.op("fmul", size, size)
-    series = (-929569.0 / 638512875.0, 21844.0 / 6081075.0, -1382.0 / 155925.0, 62.0 / 2835.0, -17.0 / 315.0, 2.0 / 15.0, -1.0 / 3.0)
+    series = (
+        -929569.0 / 638512875.0,
+        21844.0 / 6081075.0,
+        -1382.0 / 155925.0,
+        62.0 / 2835.0,
+        -17.0 / 315.0,
+        2.0 / 15.0,
+        -1.0 / 3.0,
+    )
     near = code.fma(code.op("fmul", z, size), _polynomial(code, z, series), size)
     close = code.compare("olt", size, code.constant(0.1))
     return code.with_sign_of(code.select(close, near, far), x)

@@ -10,7 +10,8 @@ import numpy as np
 
 from rotorfault.engine import native
 from rotorfault.engine.batch import Array
-from rotorfault.engine.emit import Code, Emitter, Leaf, declarations, merging
+from rotorfault.engine.code import Code, declarations
+from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.machine import aligned, grouped, ungrouped
 from rotorfault.engine.trace import Tape
 from rotorfault.records import flatten, unflatten

@@ -22,7 +22,8 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from rotorfault.engine.batch import Batch, as_drive, drive_template
-from rotorfault.engine.emit import Code, Emitter, Leaf, declarations, merging
+from rotorfault.engine.code import Code, declarations
+from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.geometry import PerRotor, zeros
 from rotorfault.records import flatten, leaf_names, unflatten

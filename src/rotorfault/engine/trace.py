@@ -206,7 +206,7 @@ def _ordered(a: Term, b: Term) -> tuple[Term, Term]:
     return (a, b) if a.index <= b.index else (b, a)
 
 
-# ------------------------------------------------------------------------------- what `rotorfault.scalar` dispatches to
+# ------------------------------------------------------------------------------ what `rotorfault.scalar` calls
 
 
 def _tape_of(*arguments: Operand) -> Tape:

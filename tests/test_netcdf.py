@@ -1,0 +1,98 @@
+"""The file of a flight: what is written straight from its arrays reads like what xarray writes of the same flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+import pytest
+import xarray as xr
+
+import rotorfault as rf
+from rotorfault import dataset, netcdf
+from rotorfault.flight_data import FlightData, flight_data
+from rotorfault.telemetry import SIGNAL_NAMES
+
+ATTRIBUTES: dict[str, Any] = {
+    "format": dataset.FORMAT, "title": "Grüße", "own_controller": "", "seed": 7, "thrust_max": 9.81, "end_time": 0.1,
+    "configuration": "x" * 100_000,  # more than HDF5 holds in a plain attribute
+}  # fmt: skip
+
+
+def made(records: int) -> FlightData:
+    signals = np.random.default_rng(1).standard_normal((records, len(SIGNAL_NAMES)))
+    signals[0, :9] = [np.nan, np.inf, -np.inf, -0.0, 5e-324, 1e308, np.pi, 0.0, 1.0]
+    return flight_data(signals, np.arange(records) * 1e-3, dict(ATTRIBUTES))
+
+
+def read(path: Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        return opened.load()
+
+
+@pytest.mark.parametrize("records", [1, 2, 20_000])
+def test_the_file_reads_like_one_that_xarray_wrote(records: int, tmp_path: Path) -> None:
+    data = made(records)
+    netcdf.write_netcdf(data, tmp_path / "direct.nc")
+    dataset.write_netcdf(dataset.as_dataset(data), tmp_path / "xarray.nc")
+    direct, other = read(tmp_path / "direct.nc"), read(tmp_path / "xarray.nc")
+    xr.testing.assert_identical(direct, other)
+    assert list(direct.data_vars) == list(other.data_vars) == list(data.variables)
+    assert list(direct.attrs) == list(other.attrs) == list(ATTRIBUTES)
+    assert [type(value) for value in direct.attrs.values()] == [type(value) for value in other.attrs.values()]
+    for name in other.variables:
+        a, b = direct[name], other[name]
+        assert a.dtype == b.dtype
+        assert a.dims == b.dims
+        assert list(a.attrs) == list(b.attrs)
+        assert {k: str(v) for k, v in a.encoding.items() if k != "source"} == {
+            k: str(v) for k, v in b.encoding.items() if k != "source"
+        }, name
+
+
+def test_values_come_back_to_the_last_bit(tmp_path: Path) -> None:
+    data = made(50)
+    netcdf.write_netcdf(data, tmp_path / "flight.nc")
+    found = dataset.read_netcdf(tmp_path / "flight.nc")
+    for name, variable in {**data.variables, **data.coordinates}.items():
+        assert found[name].values.tobytes() == np.ascontiguousarray(variable.values).tobytes(), name
+        assert found[name].attrs == variable.attrs, name
+    assert found.attrs == ATTRIBUTES
+
+
+def test_dimensions_are_those_of_netcdf_4(tmp_path: Path) -> None:
+    """By h5netcdf, which refuses what is no NetCDF-4: every dimension is a coordinate, none is anonymous."""
+    netcdf.write_netcdf(made(5), tmp_path / "flight.nc")
+    with h5netcdf.File(tmp_path / "flight.nc", "r") as file:
+        assert {name: dim.size for name, dim in file.dimensions.items()} == {
+            "time": 5, "axis": 3, "angle": 3, "angle_2": 3, "rotor": 4,
+        }  # fmt: skip
+        assert file["gain_angle"].dimensions == ("time", "angle", "angle_2")
+        for name in file.variables:
+            ids = [list(file.dimensions).index(dim) for dim in file[name].dimensions]
+            assert file[name]._h5ds.attrs["_Netcdf4Coordinates"].tolist() == ids
+
+
+def test_what_is_changed_in_the_dataset_is_saved(tmp_path: Path) -> None:
+    """Once somebody has the dataset, it is the flight: its summary and file follow."""
+    flight = rf.fly("paper-set-point", settings={"duration": 0.1})
+    before = flight.summary()
+    flight.data["position"][-1] = 5.0
+    flight.data["energy"] = ("time", np.ones(100), {"units": "J"})
+    flight.data.attrs["note"] = "mine"
+    assert flight.summary()["position_error_end"] != before["position_error_end"]
+    found = rf.load(flight.save(tmp_path / "flight.nc")).data
+    assert found["energy"].attrs == {"units": "J"}
+    assert found.attrs["note"] == "mine"
+    xr.testing.assert_identical(found, flight.data)
+
+
+def test_numbers_of_arrays_and_of_the_dataset_are_the_same() -> None:
+    landing = {"duration": 3.0, "on_fault.kind": "land", "fault.0.time": 0.3}
+    for settings in ({"duration": 0.5}, landing):
+        flight = rf.fly("land-after-fault" if settings is landing else "paper-set-point", settings=settings)
+        before = flight.summary()
+        assert isinstance(flight.data, xr.Dataset)
+        assert flight.summary() == before
