@@ -60,46 +60,67 @@ def no_watch(done: int, records: Array) -> bool:
     return False
 
 
+class Stream(NamedTuple):
+    """One of the streams of normal numbers of a flight."""
+
+    width: int  # numbers a step
+    words: tuple[int, ...]  # tell it from the others of the same flight
+
+
+SENSOR_NOISE = Stream(12, ())  # `Normals`
+GUSTS = Stream(3, (1,))  # `Drive.gust`
+FIRST_GUST = Stream(6, (2,))  # `FirstNormals`, one step of them
+
+
 class Noise:
     """Standard normal numbers of each flight, the same whatever batch it flies in.
 
-    A counter-based generator (Philox) per flight, keyed by (seed, flight index); numbers are drawn in order of
-    steps, twelve a step.
+    A counter-based generator (Philox) per flight and stream, keyed by (seed, flight index) and the words of the
+    stream; numbers are drawn in order of steps. Streams of their own keep the gusts of a flight when its sensors get
+    noise, and the other way round.
     """
 
-    def __init__(self, seeds: tuple[tuple[int, int], ...]) -> None:
-        self._generators = [np.random.Generator(np.random.Philox(np.random.SeedSequence(s))) for s in seeds]
+    def __init__(self, seeds: tuple[tuple[int, int], ...], stream: Stream = SENSOR_NOISE) -> None:
+        self._width = stream.width
+        sequences = [np.random.SeedSequence(s, spawn_key=stream.words) for s in seeds]
+        self._generators = [np.random.Generator(np.random.Philox(s)) for s in sequences]
 
     def draw(self, steps: int) -> Array:
-        """Numbers of the next steps, shape (steps, 12, N)."""
-        return np.stack([g.standard_normal((steps, 12)) for g in self._generators], axis=2)
+        """Numbers of the next steps, shape (steps, numbers of the stream, N)."""
+        return np.stack([g.standard_normal((steps, self._width)) for g in self._generators], axis=2)
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
     """First step and rows of the drive, chunk by chunk.
 
-    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, 24, N) with it.
+    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, rows, N) with it: twelve
+    rows more for sensors that need noise, and then three more for a wind that does.
     """
-    noise = Noise(batch.seeds) if batch.loop.sensors.needs_noise else None
+    noise = [Noise(batch.seeds, SENSOR_NOISE)] if batch.loop.sensors.needs_noise else []
+    noise += [Noise(batch.seeds, GUSTS)] if batch.loop.plant.wind.needs_noise else []
     for first in range(0, batch.steps, CHUNK):
         reference = batch.reference[first : first + CHUNK, :, None]
-        if noise is None:
+        if not noise:
             yield first, reference
         else:
             shared = np.broadcast_to(reference, (*reference.shape[:2], batch.flights))
-            yield first, np.concatenate([shared, noise.draw(len(reference))], axis=1)
+            yield first, np.concatenate([shared, *(part.draw(len(reference)) for part in noise)], axis=1)
 
 
-def drive_template(batch: Batch) -> Drive | Reference:
-    """A record of the shape that the rows of `drive_rows` flatten."""
+def drive_template(batch: Batch) -> Any:
+    """A record of the shape that the rows of `drive_rows` flatten: a drive, empty where nothing is drawn."""
     zero = zeros()
     reference = Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
-    return Drive(reference, no_noise()) if batch.loop.sensors.needs_noise else reference
+    loop = batch.loop
+    sensors: Any = no_noise() if loop.sensors.needs_noise else ()
+    gust: Any = zero if loop.plant.wind.needs_noise else ()
+    return Drive(reference, sensors, gust)
 
 
 def as_drive(record: Any) -> Drive:
     """The drive that a record of the shape of `drive_template` stands for."""
-    return record if isinstance(record, Drive) else Drive(record, no_noise())
+    noise = no_noise() if record.noise == () else record.noise
+    return Drive(record.reference, noise, zeros() if record.gust == () else record.gust)
 
 
 def columns(record: Any, count: int) -> Array:

@@ -65,11 +65,13 @@ class Split:
         self._n_drive = len(flatten(drive_template(batch)))
         self._n_plant, n_state, lanes = len(flatten(batch.state.plant)), len(start), start.shape[1]
         self._n_memory = n_state - self._n_plant
-        # [drive | plant | memory and step count], then what `decide` writes: [memory and count | command | signals].
+        # The air, last of the plant's rows, is held like the command over the plant's steps.
+        self._n_held = len(flatten(batch.state.plant.air)) + len(_COMMAND)
+        # [drive | plant | memory and step count]; what `decide` writes: [memory and count | air, command | signals].
         self._reads = np.zeros((self._n_drive + n_state, lanes))
         self._reads[self._n_drive :] = start
         self._writes = np.zeros((len(self._decide.fn), lanes))
-        # [plant | command | time], twice for the plant's steps.
+        # [plant, air its last | command | time], twice for the plant's steps.
         self._motion = [np.zeros((self._n_plant + len(_COMMAND) + 1, lanes)) for _ in range(2)]
         self._period = parameters[_index_of_period(batch)]
 
@@ -81,17 +83,17 @@ class Split:
         time = reads[-1] * self._period
         dt = self._period * (1.0 / self._substeps)
         motion = self._motion
-        command = writes[self._n_memory : self._n_memory + len(_COMMAND)]
+        held = writes[self._n_memory : self._n_memory + self._n_held]
         motion[0][:n_plant] = reads[n_drive : n_drive + n_plant]
         for buffer in motion:
-            buffer[n_plant:-1] = command
+            buffer[-1 - self._n_held : -1] = held
         for k in range(self._substeps):
             now, then = motion[k % 2], motion[1 - k % 2]
             now[-1] = time + k * dt
             self._move(now, outputs=then[:n_plant], pars=self._parameters)
         reads[n_drive : n_drive + n_plant] = motion[self._substeps % 2][:n_plant]
         reads[n_drive + n_plant :] = writes[: self._n_memory]
-        return writes[self._n_memory + len(_COMMAND) :]
+        return writes[self._n_memory + self._n_held :]
 
 
 def stepper(batch: Batch, start: Array, parameters: Array) -> Whole | Split:
@@ -138,8 +140,8 @@ def _compile_whole(batch: Batch) -> Any:
 def _compile_decide(batch: Batch) -> Any:
     drive, drive_record = _symbols("d", drive_template(batch))
     state, state_record = _symbols("s", batch.state)
-    memory, command, signals = batch.loop.decide(state_record, as_drive(drive_record), _parameters_of(batch))
-    return _function((memory, state_record.steps + 1.0, command, signals), [*drive, *state])
+    memory, air, command, signals = batch.loop.decide(state_record, as_drive(drive_record), _parameters_of(batch))
+    return _function((memory, state_record.steps + 1.0, air, command, signals), [*drive, *state])
 
 
 def _compile_move(batch: Batch) -> Any:

@@ -11,7 +11,7 @@ from rotorfault.plant.paper_model import PaperModel
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rigid_body import RigidBody
 from rotorfault.plant.sensors import SENSORS, Normals, Sensors, no_noise
-from rotorfault.plant.wind import WINDS, Air, Wind
+from rotorfault.plant.wind import WINDS, Air, FirstNormals, Wind, no_first_normals
 
 __all__ = [
     "FAULTS",
@@ -21,6 +21,7 @@ __all__ = [
     "Air",
     "BodyModel",
     "Fault",
+    "FirstNormals",
     "Ground",
     "Normals",
     "PaperModel",
@@ -32,6 +33,7 @@ __all__ = [
     "Sensors",
     "Truth",
     "Wind",
+    "no_first_normals",
     "no_noise",
     "rotor_faults",
 ]
