@@ -4,6 +4,7 @@ Importing the package registers every plant model, wind, fault and sensor suite,
 complete.
 """
 
+from rotorfault.plant.dryden import Dryden
 from rotorfault.plant.faults import FAULTS, Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.models import PLANTS, BodyModel
@@ -20,6 +21,7 @@ __all__ = [
     "WINDS",
     "Air",
     "BodyModel",
+    "Dryden",
     "Fault",
     "FirstNormals",
     "Ground",
