@@ -70,6 +70,13 @@ def test_fourth_order(plant: str, controller: str) -> None:
     np.testing.assert_allclose(slopes, 4.0, atol=0.35)
 
 
+def test_gusts_keep_the_order() -> None:
+    """They are held over a sampling period, so nothing changes within one."""
+    errors, slopes = orders(wind={"kind": "dryden", "wind_at_6m": 15.0, "altitude": 5.0})
+    assert errors[-1] > 1e-12
+    np.testing.assert_allclose(slopes, 4.0, atol=0.35)
+
+
 def test_a_fault_inside_a_step_costs_the_order() -> None:
     """Why faults have to set in on a boundary: the test above can fail."""
     errors, slopes = orders(fault_time=0.3 + PERIOD * 0.3)

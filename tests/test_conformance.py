@@ -23,8 +23,9 @@ from rotorfault.assembly import assemble
 from rotorfault.catalogue import REGISTRIES
 from rotorfault.closed_loop import Drive
 from rotorfault.engine import have_simd, load_engine
-from rotorfault.engine.batch import Batch, Noise, drive_template, no_watch
+from rotorfault.engine.batch import GUSTS, Batch, Noise, drive_template, no_watch
 from rotorfault.engine.structure import structure
+from rotorfault.geometry import Vec3, zeros
 from rotorfault.plant import no_noise
 from rotorfault.records import flatten, unflatten
 from rotorfault.scenario import Scenario, scenario_from
@@ -211,10 +212,14 @@ def test_traced_in_casadi_it_gives_the_same_numbers(parts: dict[str, str], tmp_p
     for other in (batch, assemble(_all_nudged(flown))):
         assert structure(other.loop) == structure(batch.loop)
         leaves = [float(x) for x in flatten(other.state)]
-        noise = Noise(other.seeds).draw(STEPS)[:, :, 0]
+        noise, gusts = (Noise(other.seeds, *stream).draw(STEPS)[:, :, 0] for stream in ((), (GUSTS,)))
         for k in range(STEPS):
             normals = unflatten(no_noise(), noise[k].tolist())
-            here = Drive(_reference(other, k), normals if other.loop.sensors.needs_noise else no_noise())
+            here = Drive(
+                _reference(other, k),
+                normals if other.loop.sensors.needs_noise else no_noise(),
+                Vec3.of(gusts[k].tolist()) if other.loop.plant.wind.needs_noise else zeros(),
+            )
             wanted = float_step(other, leaves, here)
             if k % 29 == 0 or 49 <= k <= 51:
                 numbers = [*leaves, *flatten((here, other.parameters))]
@@ -225,9 +230,7 @@ def test_traced_in_casadi_it_gives_the_same_numbers(parts: dict[str, str], tmp_p
 
 
 def _reference(batch: Batch, row: int) -> Any:
-    template = drive_template(batch)
-    template = template.reference if isinstance(template, Drive) else template
-    return unflatten(template, batch.reference[row].tolist())
+    return unflatten(drive_template(batch).reference, batch.reference[row].tolist())
 
 
 # ------------------------------------------------------------------------------- numbers are numbers, not structure

@@ -40,7 +40,9 @@ def flight(run: Run, seed: int) -> xr.Dataset:
         data["position_reference"].values[:] = wanted
     if "set-point" not in run.id:
         wind = PaperWind(PaperWind.Settings())
-        data["disturbance"].values[:] = [list(wind.at(t, wind.parameters()).acceleration_W) for t in time.tolist()]
+        data["disturbance"].values[:] = [
+            list(wind.at(t, (), wind.parameters()).acceleration_W) for t in time.tolist()
+        ]
     return data
 
 

@@ -149,11 +149,11 @@ def test_direct_acceleration_is_added(model):
 def test_paper_wind_at_times_worked_out_by_hand():
     air = wind("paper", scale=2.0)
     for time, expected in {0.0: (0.0, 0.0, 0.0), 5.0: (1.0, -1.0, 1.0), 15.0: (-1.0, 1.0, -1.0)}.items():
-        at = air.at(time, air.parameters())
+        at = air.at(time, (), air.parameters())
         np.testing.assert_allclose(array(at.acceleration_W), expected, atol=1e-12)
         assert array(at.velocity_W).tolist() == [0.0, 0.0, 0.0]
     # The second harmonic peaks at an eighth of the first one's period.
-    half = array(air.at(2.5, air.parameters()).acceleration_W)
+    half = array(air.at(2.5, (), air.parameters()).acceleration_W)
     np.testing.assert_allclose(half[0], 2.0 * (0.5 * math.sqrt(0.5) + 0.02), atol=1e-12)
 
 

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from rotorfault.autopilot import Autopilot
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, Start
-from rotorfault.engine.batch import Array, Batch, Noise
+from rotorfault.engine.batch import FIRST_GUST, SENSOR_NOISE, Array, Batch, Noise, Stream
 from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
-from rotorfault.plant import PLANTS, Ground, Normals, no_noise
+from rotorfault.plant import PLANTS, Ground, no_first_normals, no_noise
 from rotorfault.plant.plant import Plant
 from rotorfault.records import flatten, unflatten
 from rotorfault.reference import ReferenceTable
 from rotorfault.scenario import Scenario
 from rotorfault.scoring import AT_LIMIT, SETTLED, TRACKED, ScoringParameters, bands
 from rotorfault.signals import Reference
+
+R = TypeVar("R")
 
 
 def assemble(scenario: Scenario, controller: Any = None) -> Batch:
@@ -63,8 +65,6 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
             "its numbers are too large, or its times too short"
         )
     seeds = ((scenario.seed, 0),)
-    start = Start(*(Vec3.of(part) for part in _start(scenario)))
-    drive = Drive(_first(table), _first_noise(seeds) if sensors.needs_noise else no_noise())
     parameters = LoopParameters(
         plant=plant.parameters(scenario.mismatch.applied(vehicle)),
         autopilot=autopilot.parameters(vehicle, scenario.period),
@@ -72,6 +72,11 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
         period=scenario.period,
         scoring=scoring_parameters(scenario, rows),
     )
+    start = _start(scenario)
+    if plant.wind.needs_noise:
+        start = start._replace(gust=_first_noise(no_first_normals(), seeds, FIRST_GUST))
+    noise = _first_noise(no_noise(), seeds, SENSOR_NOISE) if sensors.needs_noise else no_noise()
+    drive = Drive(_first(table), noise)
     state = loop.initial(start, drive, parameters)
     return Batch(loop, state, parameters, rows, 1, seeds, scenario.every)
 
@@ -131,18 +136,17 @@ def _stacked(template: Any, records: list[Any]) -> Any:
     return unflatten(template, list(rows))
 
 
-def _start(scenario: Scenario) -> tuple[tuple[float, float, float], ...]:
+def _start(scenario: Scenario) -> Start:
     s = scenario.start
-    return s.position, s.velocity, s.attitude, s.body_rates
+    return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
 
 
 def _first(table: ReferenceTable) -> Reference:
     return unflatten(table.at(0), [float(leaf) for leaf in flatten(table.at(0))])
 
 
-def _first_noise(seeds: tuple[tuple[int, int], ...]) -> Normals:
-    numbers: list[float] = Noise(seeds).draw(1)[0, :, 0].tolist()
-    return unflatten(no_noise(), numbers)
+def _first_noise(template: R, seeds: tuple[tuple[int, int], ...], stream: Stream) -> R:
+    return unflatten(template, Noise(seeds, stream).draw(1)[0, :, 0].tolist())
 
 
 def reference_rows(table: ReferenceTable) -> Array:

@@ -1,5 +1,6 @@
 """The closed loop, one sampling period: the only place where truth and belief meet.
 
+    state       = plant.blown(state, normal numbers)
     truth       = plant.observe(state)
     measurement = sensors(truth)
     command     = autopilot(measurement, reference)
@@ -18,6 +19,7 @@ from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rotors import true_loss
 from rotorfault.plant.sensors import Normals, Sensors, no_noise
+from rotorfault.plant.wind import FirstNormals, no_first_normals
 from rotorfault.scalar import Scalar
 from rotorfault.scoring import Scores, Scoring, ScoringParameters, unjudged
 from rotorfault.signals import Command, Reference
@@ -49,6 +51,7 @@ class Drive(NamedTuple):
 
     reference: Reference
     noise: Normals
+    gust: Vec3 = zeros()  # three independent standard normal numbers, for the memory of the wind
 
 
 class Start(NamedTuple):
@@ -58,6 +61,7 @@ class Start(NamedTuple):
     v_W: Vec3  # m/s
     attitude: Vec3  # rad
     omega_B: Vec3  # rad/s
+    gust: FirstNormals = no_first_normals()  # how the memory of the wind starts
 
 
 @final
@@ -77,7 +81,15 @@ class ClosedLoop:
 
     def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
-        plant = self.plant.initial(*start, hover_thrust(parameters.autopilot.vehicle), parameters.plant)
+        plant = self.plant.initial(
+            start.p_W,
+            start.v_W,
+            start.attitude,
+            start.omega_B,
+            hover_thrust(parameters.autopilot.vehicle),
+            parameters.plant,
+            self.plant.wind.initial(start.gust, parameters.plant.wind, parameters.period),
+        )
         truth = self.plant.observe(plant, 0.0, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
         autopilot = self.autopilot.initial(measurement, drive.reference, parameters.autopilot)
@@ -85,29 +97,41 @@ class ClosedLoop:
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
         """One sampling period: the state after it, and the signals at its beginning."""
-        memory, scores, command, recorded = self.decide(state, drive, parameters)
+        plant, memory, scores, command, recorded = self.decide(state, drive, parameters)
         time = state.steps * parameters.period
-        plant = self.plant.step(state.plant, command, time, parameters.plant, parameters.period)
+        plant = self.plant.step(plant, command, time, parameters.plant, parameters.period)
         return LoopState(plant, memory, scores, state.steps + 1.0), recorded
 
     def decide(
         self, state: LoopState, drive: Drive, parameters: LoopParameters
-    ) -> tuple[AutopilotMemory, Scores, Command, Signals]:
-        """The sampling instant alone: the autopilot's memory and the scores after it, the command, the signals."""
+    ) -> tuple[PlantState, AutopilotMemory, Scores, Command, Signals]:
+        """The sampling instant alone: all that is held from it on, and the signals.
+
+        Returns
+        -------
+        plant : PlantState
+            With the wind of the period that begins; nothing has moved.
+        memory : AutopilotMemory
+        scores : Scores
+        command : Command
+            The autopilot's, not yet put within the rotor limits.
+        recorded : Signals
+        """
         time = state.steps * parameters.period
-        truth = self.plant.observe(state.plant, time, parameters.plant)
+        plant = self.plant.blown(state.plant, drive.gust, parameters.plant, parameters.period)
+        truth = self.plant.observe(plant, time, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
         memory, command, report = self.autopilot.step(
             state.autopilot,
             measurement,
             drive.reference,
-            self._told(state.plant, time, parameters.plant),
+            self._told(plant, time, parameters.plant),
             parameters.autopilot,
             parameters.period,
         )
         recorded = signals(truth, command, report)
         scores = self.scoring.step(state.scores, recorded, parameters.scoring, state.steps, parameters.period)
-        return memory, scores, command, recorded
+        return plant, memory, scores, command, recorded
 
     def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """The true losses, for a diagnosis source that is an oracle; nothing for any other."""

@@ -154,7 +154,7 @@ class Scenario(Strict):
     ground: float | None = Field(
         default=None, description="height of the centre of mass standing on the ground [m]; none if not given"
     )
-    seed: int = Field(default=0, ge=0, le=10**12, description="names the random numbers of sensor noise")
+    seed: int = Field(default=0, ge=0, le=10**12, description="names the random numbers of sensor noise and gusts")
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
     reference: _part(REFERENCES) = Field(description="where the vehicle shall be")  # type: ignore[valid-type]

@@ -63,56 +63,84 @@ def no_watch(done: int) -> bool:
     return False
 
 
+class Stream(NamedTuple):
+    """One of the streams of normal numbers of a flight."""
+
+    width: int  # numbers a step
+    words: tuple[int, ...]  # tell it from the others of the same flight
+
+
+SENSOR_NOISE = Stream(12, ())  # `Normals`
+GUSTS = Stream(3, (1,))  # `Drive.gust`
+FIRST_GUST = Stream(6, (2,))  # `FirstNormals`, one step of them
+
+
 class Noise:
     """Standard normal numbers of each flight, the same whatever batch it flies in.
 
-    A counter-based generator (Philox) per flight, keyed by (seed, flight index); numbers are drawn in order of
-    steps, twelve a step.
+    A counter-based generator (Philox) per flight and stream, keyed by (seed, flight index) and the words of the
+    stream; numbers are drawn in order of steps. Streams of their own keep the gusts of a flight when its sensors get
+    noise, and the other way round.
     """
 
-    def __init__(self, seeds: tuple[tuple[int, int], ...]) -> None:
-        self._generators = [np.random.Generator(np.random.Philox(np.random.SeedSequence(s))) for s in seeds]
+    def __init__(self, seeds: tuple[tuple[int, int], ...], stream: Stream = SENSOR_NOISE) -> None:
+        self.width = stream.width
+        # The index as a key of its own: as further entropy, large seeds would run into other seeds' indices.
+        sequences = [np.random.SeedSequence(seed, spawn_key=(i, *stream.words)) for seed, i in seeds]
+        self._generators = [np.random.Generator(np.random.Philox(s)) for s in sequences]
 
     def each(self, steps: int) -> Iterator[Array]:
-        """Numbers of the next steps, flight by flight, shape (steps, 12)."""
-        return (g.standard_normal((steps, 12)) for g in self._generators)
+        """Numbers of the next steps, flight by flight, shape (steps, numbers of the stream)."""
+        return (g.standard_normal((steps, self.width)) for g in self._generators)
 
     def draw(self, steps: int) -> Array:
-        """Numbers of the next steps, shape (steps, 12, N)."""
+        """Numbers of the next steps, shape (steps, numbers of the stream, N)."""
         return np.stack(list(self.each(steps)), axis=2)
 
     def only(self, flights: Sequence[int]) -> Noise:
         """The generators of some of the flights, where they are."""
         some = Noise(())
-        some._generators = [self._generators[i] for i in flights]
+        some.width, some._generators = self.width, [self._generators[i] for i in flights]
         return some
+
+
+def noise_of(batch: Batch, part: slice = slice(None)) -> list[Noise]:
+    """The generators of all streams that a batch draws from, in the order of their rows; of some of its flights."""
+    loop, seeds = batch.loop, batch.seeds[part]
+    sensors = [Noise(seeds, SENSOR_NOISE)] if loop.sensors.needs_noise else []
+    return sensors + ([Noise(seeds, GUSTS)] if loop.plant.wind.needs_noise else [])
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
     """First step and rows of the drive, chunk by chunk.
 
-    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, 24, N) with it.
+    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, rows, N) with it: twelve
+    rows more for sensors that need noise, and then three more for a wind that does.
     """
-    noise = Noise(batch.seeds) if batch.loop.sensors.needs_noise else None
+    noise = noise_of(batch)
     for first in range(0, batch.steps, CHUNK):
         reference = batch.reference[first : first + CHUNK, :, None]
-        if noise is None:
+        if not noise:
             yield first, reference
         else:
             shared = np.broadcast_to(reference, (*reference.shape[:2], batch.flights))
-            yield first, np.concatenate([shared, noise.draw(len(reference))], axis=1)
+            yield first, np.concatenate([shared, *(part.draw(len(reference)) for part in noise)], axis=1)
 
 
-def drive_template(batch: Batch) -> Drive | Reference:
-    """A record of the shape that the rows of `drive_rows` flatten."""
+def drive_template(batch: Batch) -> Any:
+    """A record of the shape that the rows of `drive_rows` flatten: a drive, empty where nothing is drawn."""
     zero = zeros()
     reference = Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
-    return Drive(reference, no_noise()) if batch.loop.sensors.needs_noise else reference
+    loop = batch.loop
+    sensors: Any = no_noise() if loop.sensors.needs_noise else ()
+    gust: Any = zero if loop.plant.wind.needs_noise else ()
+    return Drive(reference, sensors, gust)
 
 
 def as_drive(record: Any) -> Drive:
     """The drive that a record of the shape of `drive_template` stands for."""
-    return record if isinstance(record, Drive) else Drive(record, no_noise())
+    noise = no_noise() if record.noise == () else record.noise
+    return Drive(record.reference, noise, zeros() if record.gust == () else record.gust)
 
 
 def columns(record: Any, count: int, part: slice = slice(None)) -> Array:

@@ -21,13 +21,14 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+from rotorfault.closed_loop import LoopState
 from rotorfault.engine.batch import Batch, as_drive, drive_template
 from rotorfault.engine.code import Code, declarations
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.geometry import PerRotor, zeros
 from rotorfault.records import flatten, leaf_names, unflatten
-from rotorfault.signals import Command, Reference
+from rotorfault.signals import Command
 
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
 
@@ -71,8 +72,7 @@ class Program(NamedTuple):
 def trace(batch: Batch) -> Traced:
     """Run the closed loop of a batch once, on terms."""
     loop, template = batch.loop, drive_template(batch)
-    rows = len(flatten(template))
-    shared = rows if isinstance(template, Reference) else len(flatten(template.reference))
+    rows, shared = len(flatten(template)), len(flatten(template.reference))
     names = leaf_names(batch.state)
     layout = Layout(
         parameters=len(flatten(batch.parameters)),
@@ -92,11 +92,11 @@ def trace(batch: Batch) -> Traced:
         only = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
         return Traced((only,), 1, layout._replace(signals=len(only.signals)))
 
-    memory, scores, command, signals = loop.decide(state, drive, parameters)
-    decided = flatten((memory, scores, state.steps + 1.0))
-    first = layout.state - len(decided)
+    held, memory, scores, command, signals = loop.decide(state, drive, parameters)
+    command = loop.plant.limited(command, parameters.plant)
+    decided = flatten(LoopState(held, memory, scores, state.steps + 1.0))
     kept = flatten((command, state.steps * parameters.period))
-    writes = [("%state", first + row, tape.lift(x)) for row, x in enumerate(decided)]
+    writes = [("%state", row, tape.lift(x)) for row, x in enumerate(decided)]
     writes += [("%kept", row, tape.lift(x)) for row, x in enumerate(kept)]
     instant = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
 

@@ -17,7 +17,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.batch import CHUNK, Array, Batch, Noise, Recording, Records, Watch, columns, no_watch
+from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, no_watch, noise_of
 from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
@@ -138,7 +138,7 @@ class _Block:
             for machine in (common.quiet, common.recording)
             if machine is not None
         }
-        self._noise = Noise(batch.seeds[part]) if common.layout.own else None
+        self._noise = noise_of(batch, part)
 
     def _advance(self, first: int, steps: int) -> None:
         """Fly some steps, and record those that are wanted."""
@@ -176,12 +176,15 @@ class _Block:
 
     def _own(self, steps: int) -> Array | None:
         """Random numbers of the next steps, shape (groups, steps, rows, lanes)."""
-        if self._noise is None:
+        if not self._noise:
             return None
         lanes = self._common.lanes
         own = aligned((len(self._state), steps, self._common.layout.own, lanes))
-        for i, numbers in enumerate(self._noise.each(steps)):
-            own[i // lanes, :, :, i % lanes] = numbers
+        row = 0
+        for stream in self._noise:
+            for i, numbers in enumerate(stream.each(steps)):
+                own[i // lanes, :, row : row + stream.width, i % lanes] = numbers
+            row += stream.width
         return own
 
     def _drop(self) -> None:
@@ -201,8 +204,7 @@ class _Block:
         self._prepared = {
             key: grouped(ungrouped(prepared, count)[:, flying], lanes) for key, prepared in self._prepared.items()
         }
-        if self._noise is not None:
-            self._noise = self._noise.only(flying)
+        self._noise = [stream.only(flying) for stream in self._noise]
 
     def _keep(self, flights: NDArray[np.intp], rows: Array) -> None:
         self._common.state[:, flights] = rows

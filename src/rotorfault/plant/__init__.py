@@ -4,6 +4,7 @@ Importing the package registers every plant model, wind, fault and sensor suite,
 complete.
 """
 
+from rotorfault.plant.dryden import Dryden
 from rotorfault.plant.faults import FAULTS, Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.models import PLANTS, BodyModel
@@ -11,7 +12,7 @@ from rotorfault.plant.paper_model import PaperModel
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rigid_body import RigidBody
 from rotorfault.plant.sensors import SENSORS, Normals, Sensors, no_noise
-from rotorfault.plant.wind import WINDS, Air, Wind
+from rotorfault.plant.wind import WINDS, Air, FirstNormals, Wind, no_first_normals
 
 __all__ = [
     "FAULTS",
@@ -20,7 +21,9 @@ __all__ = [
     "WINDS",
     "Air",
     "BodyModel",
+    "Dryden",
     "Fault",
+    "FirstNormals",
     "Ground",
     "Normals",
     "PaperModel",
@@ -32,6 +35,7 @@ __all__ = [
     "Sensors",
     "Truth",
     "Wind",
+    "no_first_normals",
     "no_noise",
     "rotor_faults",
 ]

@@ -1,9 +1,9 @@
 """The truth: body, rotors, wind and faults together, one sampling period at a time.
 
-The command is held over the period. The rotor lag is part of the integrated state. Wind is taken at the stage
-times of the integrator; faults once at the start of each sub-step, so that one that sets in on a sub-step's
-boundary acts exactly from there on and never costs the integrator its order. Ground is a choice of structure: a
-flight without it has none of its operations.
+The command is held over the period, and so is the memory of the wind. The rotor lag is part of the integrated state.
+Wind is taken at the stage times of the integrator; faults once at the start of each sub-step, so that one that sets
+in on a sub-step's boundary acts exactly from there on and never costs the integrator its order. Ground is a choice of
+structure: a flight without it has none of its operations.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class PlantState(NamedTuple):
 
     body: Any  # record of the body model
     rotors: PerRotor  # N, lag outputs v of (8)
+    air: Any = ()  # memory of the wind over the period that begins or, between periods, has ended; not integrated
 
 
 class Truth(NamedTuple):
@@ -110,6 +111,7 @@ class Plant:
         omega_B: Vec3,
         rotor_thrust: PerRotor,
         parameters: PlantParameters,
+        air: Any = (),
     ) -> PlantState:
         """State at the start of a flight.
 
@@ -122,9 +124,26 @@ class Plant:
         rotor_thrust : PerRotor, N
             Thrusts k v that the rotors give if they are sound.
         parameters : PlantParameters
+        air : record
+            Memory of the wind from its `initial`; empty for winds without memory.
         """
         body = self.model.initial(p_W, v_W, attitude, omega_B)
-        return PlantState(body, rotor_thrust / parameters.vehicle.rotor_gain)
+        return PlantState(body, rotor_thrust / parameters.vehicle.rotor_gain, air)
+
+    def blown(self, state: PlantState, gust: Vec3, parameters: PlantParameters, period: Scalar) -> PlantState:
+        """The state with the wind brought to the sampling period that begins; once in each, before all else.
+
+        Parameters
+        ----------
+        state : PlantState
+        gust : Vec3
+            Standard normal numbers; without effect where the wind needs no noise.
+        parameters : PlantParameters
+        period : scalar, s
+        """
+        if state.air == ():
+            return state
+        return state._replace(air=self.wind.step(state.air, gust, parameters.wind, period))
 
     def step(
         self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, period: Scalar
@@ -134,6 +153,7 @@ class Plant:
         Parameters
         ----------
         state : PlantState
+            Blown, so that its air is that of this period.
         command : Command
             Held over the period; put within the rotor limits here.
         time : scalar, s
@@ -141,16 +161,20 @@ class Plant:
         parameters : PlantParameters
         period : scalar, s
         """
-        command = command._replace(thrust=limited_command(parameters.vehicle, command.thrust))
+        command = self.limited(command, parameters)
         dt = period * (1.0 / self.substeps)
         for k in range(self.substeps):
             state = self.substep(state, command, time + k * dt, parameters, dt)
         return state
 
+    def limited(self, command: Command, parameters: PlantParameters) -> Command:
+        """The command within the rotor limits."""
+        return command._replace(thrust=limited_command(parameters.vehicle, command.thrust))
+
     def substep(
         self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, dt: Scalar
     ) -> PlantState:
-        """State one integration step of length dt [s] later, the command held."""
+        """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
         vehicle = parameters.vehicle
         fault = rotor_faults(self.faults, parameters.faults, time)
 
@@ -168,12 +192,12 @@ class Plant:
                 extra_W,
                 vehicle,
                 residual_speed(vehicle, speeds),
-                self.wind.at(motion.time, parameters.wind),
+                self.wind.at(motion.time, state.air, parameters.wind),
             )
             return _Motion(1.0, body_dot, lag_derivative(vehicle, motion.rotors, command.thrust))
 
         after = rk4(derivative, _Motion(time, state.body, state.rotors), dt)
-        return PlantState(self.model.after_step(after.body), after.rotors)
+        return PlantState(self.model.after_step(after.body), after.rotors, state.air)
 
     def observe(self, state: PlantState, time: Scalar, parameters: PlantParameters) -> Truth:
         """The truth at a time in s since the start of the flight."""
@@ -185,7 +209,7 @@ class Plant:
             thrust=delivered_thrust(vehicle, state.rotors, fault),
             rotor_speed=true_rotor_speeds(vehicle, state.rotors, fault),
             loss=true_loss(vehicle, state.rotors, fault),
-            air=self.wind.at(time, parameters.wind),
+            air=self.wind.at(time, state.air, parameters.wind),
             ground_force=0.0 if ground is None else ground.contact(measurement, parameters.ground).normal,
         )
 

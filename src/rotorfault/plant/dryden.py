@@ -1,0 +1,182 @@
+r"""Gusts: the Dryden model of turbulence near the ground, on top of a steady wind.
+
+Source: MIL-F-8785C, "Flying Qualities of Piloted Airplanes", 1980, section 3.7, form for low altitude. The gust
+velocities u along, v across and w up have the power spectra
+
+.. math:: \Phi_u(\omega) = \sigma_u^2\frac{2\tau_u}{\pi}\frac{1}{1 + (\tau_u\omega)^2}, \qquad
+          \Phi_{v,w}(\omega) = \sigma^2\frac{\tau}{\pi}\frac{1 + 3(\tau\omega)^2}{(1 + (\tau\omega)^2)^2}, \qquad
+          \tau = L/V
+
+and, with the height h above ground (in feet where it is h_ft),
+
+.. math:: L_w = h,\quad L_u = L_v = \frac{h}{(0.177 + 0.000823 h_{ft})^{1.2}}, \qquad
+          \sigma_w = 0.1 W_{20},\quad \sigma_u = \sigma_v = \frac{\sigma_w}{(0.177 + 0.000823 h_{ft})^{0.4}}
+
+The source is about airplanes, whose airspeed carries them through a frozen field. A multirotor hovers, and the mean
+wind carries the field past it: V is the speed of the mean wind, but at least `airspeed_min`, and h that of the
+settings throughout a flight. u is along the mean wind's horizontal direction, along x if it has none. The gusts of
+the body rates, made for wings, are left out.
+
+**Discrete in time, without error.** Over a sampling period T the gust is held. With x = T/tau, a = exp(-x),
+c = 1 - a^2, independent standard normal n and all in units of sigma,
+
+.. math:: u' = a u + \sqrt{c}\,n
+
+has the autocorrelation exp(-x) per period of Phi_u. Phi_v and Phi_w belong to the filter
+(1 + sqrt(3) tau s)/(1 + tau s)^2 and to the autocorrelation (1 - kx/2) a^k over k periods. A chain of two states
+with independent noise on each would give it at the price of two normal numbers; one is enough, because a Gaussian
+process with this autocorrelation at the sampling instants has one innovation per instant:
+
+.. math:: v' = a v - c\sin\varphi\, s + \sqrt{c}(\cos\varphi + a\sin\varphi)\,n, \qquad
+          s' = a s + \sqrt{c}\,n, \qquad \sin 2\varphi = \frac{xa}{c}
+
+Proof: let v and s have variance 1 and covariance cos(phi). Then both equations give variance 1 and covariance
+cos(phi) again, and v' has the covariance a - c sin(phi) cos(phi) = a (1 - x/2) with v; A^2 = 2aA - a^2 for the matrix
+A of the recursion continues it to (1 - kx/2) a^k. So at the sampling instants all statistics are those of the
+continuous filter, whatever the period, from the first instant on if v and s start with this covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, NamedTuple, final
+
+from pydantic import Field
+
+from rotorfault.config import Strict
+from rotorfault.geometry import Vec3, zeros
+from rotorfault.plant.wind import WINDS, Air, FirstNormals, Wind
+from rotorfault.scalar import Scalar, exp, maximum, sqrt
+
+FOOT = 0.3048  # m
+
+
+class DrydenParameters(NamedTuple):
+    """Numbers of the gusts and of the wind that carries them."""
+
+    velocity_W: Vec3  # m/s, mean wind
+    airspeed_min: Scalar  # m/s
+    along_x: Scalar  # 1, horizontal unit vector along the mean wind
+    along_y: Scalar  # 1
+    sigma_level: Scalar  # m/s, of u and v
+    sigma_up: Scalar  # m/s, of w
+    length_level: Scalar  # m, of u and v
+    length_up: Scalar  # m, of w
+
+
+class DrydenMemory(NamedTuple):
+    """The gust of a sampling period and the second states of its filters, all of variance 1."""
+
+    gust: Vec3  # along, across, up, each over its sigma
+    across: Scalar  # s of v
+    up: Scalar  # s of w
+
+
+class _Filter(NamedTuple):
+    """Numbers of one filter at one sampling period."""
+
+    a: Scalar  # exp(-x)
+    c: Scalar  # 1 - a^2
+    cos: Scalar  # of phi
+    sin: Scalar
+
+    def first_order(self, u: Scalar, n: Scalar) -> Scalar:
+        """u one period later."""
+        return self.a * u + sqrt(self.c) * n
+
+    def second_order(self, v: Scalar, s: Scalar, n: Scalar) -> Scalar:
+        """v one period later; s follows `first_order`."""
+        a, c = self.a, self.c
+        return a * v - c * self.sin * s + sqrt(c) * (self.cos + a * self.sin) * n
+
+    def start(self, v: Scalar, n: Scalar) -> Scalar:
+        """s that has the covariance of the stationary process with v, for v and n independent standard normal."""
+        return self.cos * v + self.sin * n
+
+
+def _filter(length: Scalar, parameters: DrydenParameters, period: Scalar) -> _Filter:
+    airspeed = maximum(parameters.velocity_W.norm(), parameters.airspeed_min)
+    x = airspeed * period / length
+    a = exp(-x)
+    c = 1.0 - a * a
+    # sin(2 phi) is between 0 and 1/2: both roots are real, and their difference loses no digits.
+    double = x * a / c
+    more, less = sqrt(1.0 + double), sqrt(1.0 - double)
+    return _Filter(a, c, 0.5 * (more + less), 0.5 * (more - less))
+
+
+@final
+@WINDS.register("dryden")
+class Dryden(Wind):
+    """Steady wind with random gusts: Dryden model of MIL-F-8785C for low altitude."""
+
+    needs_noise: ClassVar[bool] = True
+
+    class Settings(Strict):
+        """Mean wind, and what the gusts' intensity and scale follow from; the defaults fit the paper's 3.6 m/s."""
+
+        velocity_W: tuple[float, float, float] = Field(
+            (-3.33, 1.36, 0.0), description="mean velocity of the air over ground along x, y, z of the world [m/s]"
+        )
+        wind_at_6m: float = Field(
+            3.6, ge=0.0, description="wind speed 20 ft above ground, which sets the intensity of the gusts [m/s]"
+        )
+        altitude: float = Field(
+            10.0,
+            ge=10.0 * FOOT,
+            le=1000.0 * FOOT,
+            description="height above ground, fixed per flight [m]; the model holds from 10 to 1000 ft",
+        )
+        airspeed_min: float = Field(
+            1.0, ge=0.1, description="least speed with which the gusts are carried past the vehicle [m/s]"
+        )
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+
+    def parameters(self) -> DrydenParameters:
+        """Mean wind, standard deviations and scale lengths."""
+        s = self.settings
+        x, y, _ = s.velocity_W
+        level = math.hypot(x, y)
+        shape = 0.177 + 0.000823 * s.altitude / FOOT
+        sigma_up = 0.1 * s.wind_at_6m
+        return DrydenParameters(
+            velocity_W=Vec3.of(s.velocity_W),
+            airspeed_min=s.airspeed_min,
+            along_x=x / level if level > 0.0 else 1.0,
+            along_y=y / level if level > 0.0 else 0.0,
+            sigma_level=sigma_up / shape**0.4,
+            sigma_up=sigma_up,
+            length_level=s.altitude / shape**1.2,
+            length_up=s.altitude,
+        )
+
+    def initial(self, normals: FirstNormals, parameters: DrydenParameters, period: Scalar) -> DrydenMemory:
+        """Memory in its stationary distribution."""
+        gust, other = normals
+        level = _filter(parameters.length_level, parameters, period)
+        up = _filter(parameters.length_up, parameters, period)
+        return DrydenMemory(gust, level.start(gust.y, other.y), up.start(gust.z, other.z))
+
+    def step(self, memory: DrydenMemory, normals: Vec3, parameters: DrydenParameters, period: Scalar) -> DrydenMemory:
+        """The gust of the next sampling period."""
+        n, (gust, across, above) = normals, memory
+        level = _filter(parameters.length_level, parameters, period)
+        up = _filter(parameters.length_up, parameters, period)
+        return DrydenMemory(
+            gust=Vec3(
+                level.first_order(gust.x, n.x),
+                level.second_order(gust.y, across, n.y),
+                up.second_order(gust.z, above, n.z),
+            ),
+            across=level.first_order(across, n.y),
+            up=up.first_order(above, n.z),
+        )
+
+    def at(self, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Air:
+        """Mean wind plus gust."""
+        p, gust = parameters, memory.gust
+        u, v, w = gust.x * p.sigma_level, gust.y * p.sigma_level, gust.z * p.sigma_up
+        gust_W = Vec3(p.along_x * u - p.along_y * v, p.along_y * u + p.along_x * v, w)
+        return Air(p.velocity_W + gust_W, zeros())
