@@ -184,7 +184,7 @@ def test_it_flies(group: str, name: str, tmp_path: Path) -> None:
 
 
 @each_flight
-@pytest.mark.skipif(not have_simd(), reason="needs heyoka")
+@pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
 def test_compiled_it_gives_the_same_numbers(parts: dict[str, str], tmp_path: Path) -> None:
     flown = scenario(tmp_path, **parts)
     found, wanted = run(flown, "simd"), run(flown, "python")

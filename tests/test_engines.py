@@ -23,14 +23,17 @@ from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
 from rotorfault.neighbours import neighbour
+from rotorfault.records import leaf_names
 from rotorfault.scenario import Scenario, load_scenario, scenario_from
+from rotorfault.score_table import score_table
 from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.touchdown import in_the_air
 from rotorfault.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]
 POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)
 SPREAD = 5e-9  # relative, over all signals: rates and switching inputs are large and steep
-_NEEDS = {"simd": [pytest.mark.skipif(not have_simd(), reason="needs heyoka")]}
+_NEEDS = {"simd": [pytest.mark.skipif(not have_simd(), reason="needs llvmlite")]}
 every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
 
 
@@ -89,7 +92,7 @@ def test_python_agrees_with_simd(simd_case_one: Array) -> None:
 
 def test_numpy_agrees_with_simd() -> None:
     """The first 3 s of case 1, and of a neighbour whose faults come at 1 s, at 2 ms."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("llvmlite")
     base = case_one(duration=3.0, period=0.002, step=0.002)
     batch = assemble_all([base, neighbour(base, 3, onset=(1.0, 1.0))])
     found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
@@ -99,16 +102,20 @@ def test_numpy_agrees_with_simd() -> None:
 
 
 def test_force_limit_stays_real_on_compiled_code() -> None:
-    """Fused operations round a^2 - b^2 once: where a = b that fell below zero under the root."""
-    hy = pytest.importorskip("heyoka")
+    """Fused operations round a^2 - b^2 once: where a = b that could fall below zero under the root."""
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine.function import CompiledFunction
+
     vehicle = load_vehicle("paper").vehicle
-    x, y, z, share = hy.make_vars("x", "y", "z", "share")
     cascade = Cascade(Sdre(Weights()), CascadeSettings())
-    numbers = cascade.parameters(vehicle, 1e-3)._replace(thrust_share=share)
-    force = limited_force(Vec3(x, y, z), 4.0 * vehicle.thrust_max, vehicle, numbers)
+    numbers = cascade.parameters(vehicle, 1e-3)
+
+    def limited(force: Vec3, share: Any) -> Vec3:
+        return limited_force(force, 4.0 * vehicle.thrust_max, vehicle, numbers._replace(thrust_share=share))
+
     shares = np.linspace(0.5, 1.0, 4096)
-    compiled = hy.cfunc(list(force), [x, y, z, share])
-    found = compiled(np.ascontiguousarray([np.full(4096, 9.0), np.full(4096, -4.0), np.full(4096, 1e3), shares]))
+    rows = np.array([np.full(4096, 9.0), np.full(4096, -4.0), np.full(4096, 1e3), shares])
+    found = CompiledFunction(limited, Vec3(0.0, 0.0, 0.0), 0.0)(rows)
     assert np.isfinite(found).all()
     assert np.abs(found[:2]).max() < 1e-6
     np.testing.assert_allclose(found[2], shares * 4.0 * vehicle.thrust_max / vehicle.mass, rtol=1e-14)
@@ -141,6 +148,100 @@ def test_a_long_compiled_flight_does_not_depend_on_its_batch(simd_case_one: Arra
     for size in (3, 9):
         batch = assemble_all([base, *(neighbour(base, k) for k in range(1, size))])
         np.testing.assert_array_equal(run(batch, "simd").signals[:, :, 0], simd_case_one[:, :, 0])
+
+
+def many(count: int, **tables: Any) -> Batch:
+    """Flights of which some are lost early: they differ in the size of the fault and in their seed."""
+    base = short(
+        sensors="noisy",
+        duration=0.005 * (2 * CHUNK + 100),
+        diagnosis="off",
+        **tables,
+    ).as_tables()
+    return assemble_all(
+        [
+            scenario_from(
+                base | {"seed": k, "fault": [{"kind": "step", "rotor": 2, "time": 0.1, "loss": loss}]}, "test"
+            )
+            for k, loss in enumerate(np.linspace(0.0, 0.9, count))
+        ]
+    )
+
+
+def test_numbers_depend_on_nothing_but_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither on threads, nor on blocks, nor on what is recorded, nor on who leaves its lane."""
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine import simd
+
+    batch = many(29)
+    wanted = simd.run(batch, threads=1)
+    over = wanted.state[leaf_names(batch.state).index("scores.over")]
+    assert 5 < np.count_nonzero(over) < 25, "some must be lost, and some not"
+    for groups, threads, every in ((1, 1, 0), (1, 2, 0), (2, 2, 7), (8, 2, 1), (1, 2, 1)):
+        monkeypatch.setattr(simd, "GROUPS", groups)
+        found = simd.run(batch._replace(every=every), threads=threads)
+        flying = over == 0.0
+        np.testing.assert_array_equal(found.state[:, flying], wanted.state[:, flying])
+        scores = slice(leaf_names(batch.state).index("scores.over"), -1)
+        np.testing.assert_array_equal(found.state[scores], wanted.state[scores])
+        if every:
+            np.testing.assert_array_equal(found.signals[:, :, flying], wanted.signals[::every, :, flying])
+
+
+def test_a_flight_that_is_over_stops_costing(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine import simd
+
+    batch = many(32)._replace(every=0)
+    lost = assemble_all(
+        [
+            scenario_from(
+                short(diagnosis="off", duration=10.0, fault=[{"kind": "total", "rotor": 2, "time": 0.1}]).as_tables(),
+                "test",
+            )
+        ]
+        * 3
+    )
+    assert simd.run(batch).flown < 0.95 * batch.flights * batch.steps
+    assert simd.run(lost._replace(every=0)).flown <= 3 * CHUNK
+
+
+def test_only_wanted_signals_are_recorded() -> None:
+    batch = assemble(short())
+    for engine in ENGINES:
+        if engine == "simd" and not have_simd():
+            continue
+        full = run(batch, engine)
+        some = run(batch._replace(wanted=(2, 0, 50)), engine)
+        np.testing.assert_array_equal(some.signals, full.signals[:, [2, 0, 50]])
+
+
+@every_engine
+def test_scores_are_those_of_the_records(engine: str) -> None:
+    """All that `rotorfault.metrics` counts from the records, counted in flight: the same on every engine."""
+    landing = {"ground": -0.4, "on_fault": "land", "duration": 3.0, "sensors": "ideal"}
+    for scenario in (
+        short(),
+        short(**landing),
+        short(diagnosis="off", duration=1.5, fault=[{"kind": "total", "rotor": 2, "time": 0.1}]),
+    ):
+        batch = assemble(scenario)
+        recording = run(batch, engine)
+        flight = rotorfault.fly(scenario, engine=engine)
+        found, summary = score_table(batch, recording.state).row(0), flight.summary()
+        told = {str(detection["rotor"]): detection for detection in summary["detections"]}
+        summary["lowest"] = float(in_the_air(flight.data)["position"].values[:, 2].min())
+        summary["onset"] = {rotor: told[rotor]["true_time"] if rotor in told else None for rotor in "1234"}
+        summary["detected"] = {rotor: told[rotor]["detected_time"] if rotor in told else None for rotor in "1234"}
+        for name, value in found.items():
+            wanted = summary
+            for part in name.split("."):
+                wanted = wanted[part]
+            if isinstance(value, float):
+                wanted = np.nan if wanted is None else wanted
+                assert value == pytest.approx(wanted, rel=1e-9, abs=1e-12, nan_ok=True), name
+            else:
+                assert value == wanted, name
 
 
 def test_noise_belongs_to_the_flight() -> None:
@@ -208,32 +309,21 @@ def test_records_cross_chunks(engine: str) -> None:
 
 @every_engine
 def test_a_watch_ends_a_batch(engine: str) -> None:
-    seen: list[tuple[int, int]] = []
+    seen: list[int] = []
 
-    def watch(done: int, records: Array) -> bool:
-        seen.append((done, len(records)))
+    def watch(done: int) -> bool:
+        seen.append(done)
         return done >= CHUNK
 
     recording = run(short(duration=0.005 * 3 * CHUNK, record_period=0.01), engine, watch)
-    assert seen == [(CHUNK, CHUNK // 2)]
+    assert seen == [CHUNK]
     assert len(recording.steps) == len(recording.signals) == CHUNK // 2
     assert not recording.interrupted
 
 
 @every_engine
-def test_looks_at_the_records_copy_none(engine: str) -> None:
-    """A copy for every look would take time with the square of the flight's length."""
-    looks: list[Array] = []
-
-    scenario = short(duration=0.005 * 2 * CHUNK, sensors="ideal")
-    recording = run(scenario, engine, lambda done, records: bool(looks.append(records)))
-    assert [len(look) for look in looks] == [CHUNK, 2 * CHUNK]
-    assert all(np.shares_memory(look, recording.signals) for look in looks)
-
-
-@every_engine
 def test_an_interrupted_flight_keeps_what_it_has(engine: str) -> None:
-    def watch(done: int, records: Array) -> bool:
+    def watch(done: int) -> bool:
         raise KeyboardInterrupt
 
     recording = run(short(duration=0.005 * 2 * CHUNK), engine, watch)
@@ -261,10 +351,10 @@ def test_engines_are_found_by_name() -> None:
     assert default_engine(1000) == ("simd" if have_simd() else "numpy")
 
 
-def test_without_heyoka_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_llvmlite_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert (default_engine(1), default_engine(16)) == ("python", "numpy")
-    with pytest.raises(InputError, match="heyoka, which is not installed; use --engine numpy or --engine python"):
+    with pytest.raises(InputError, match="llvmlite, not installed; use --engine numpy or --engine python"):
         load_engine("simd")
 
 
@@ -272,31 +362,35 @@ def test_without_heyoka_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch)
 
 
 class Compiler:
-    """Counts compilations; the compiled thing itself is small, whatever the loop."""
+    """Counts compilations."""
 
     def __init__(self, module: Any) -> None:
-        self.count, self._right = 0, module._compile_whole
+        self.count, self._right = 0, module.compile_text
 
-    def __call__(self, batch: Batch) -> Any:
+    def __call__(self, text: str) -> bytes:
         self.count += 1
-        return self._right(batch)
+        code: bytes = self._right(text)
+        return code
 
 
 @pytest.fixture
 def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Compiler:
-    pytest.importorskip("heyoka")
-    from rotorfault.engine import compiled
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine import native
 
-    found = Compiler(compiled)
-    monkeypatch.setattr(compiled, "_compile_whole", found)
-    monkeypatch.setattr(cache, "_KEPT", {})
+    found = Compiler(native)
+    monkeypatch.setattr(native, "compile_text", found)
+    forget(monkeypatch)
     monkeypatch.setenv("ROTORFAULT_CACHE", str(tmp_path / "cache"))
     return found
 
 
 def forget(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a process that has just been started."""
+    from rotorfault.engine import machine
+
     monkeypatch.setattr(cache, "_KEPT", {})
+    monkeypatch.setattr(machine, "_LOADED", {})
 
 
 def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -311,12 +405,12 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
 
     # Really another process: its compiler must not be asked.
     code = (
-        "from rotorfault.engine import compiled, load_engine\n"
+        "from rotorfault.engine import load_engine, native\n"
         "from rotorfault.assembly import assemble\n"
         "from rotorfault.engine.batch import no_watch\n"
         "from rotorfault.scenario import scenario_from\n"
-        "def refuse(batch): raise SystemExit('compiled again')\n"
-        "compiled._compile_whole = refuse\n"
+        "def refuse(text): raise SystemExit('compiled again')\n"
+        "native.compile_text = refuse\n"
         f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
         "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
     )
@@ -335,9 +429,9 @@ def test_a_damaged_file_is_replaced(compiler: Compiler, monkeypatch: pytest.Monk
     damaged = {
         "empty": b"",
         "truncated": right[:middle],
-        "no pickle": b"not at all",
-        "a pickle of something else": hashlib.sha256(b"N.").digest() + b"N.",
-        # heyoka would load this one, and fly with damaged code.
+        "no code": b"not at all",
+        "something else": hashlib.sha256(b"{}\n").digest() + b"{}\n",
+        # This one could be loaded, and would fly with damaged code.
         "one byte changed": right[:middle] + bytes([right[middle] ^ 1]) + right[middle + 1 :],
     }
     for count, (what, content) in enumerate(damaged.items(), start=2):
@@ -364,7 +458,7 @@ def test_a_cache_that_cannot_be_written_is_done_without(
 
 def test_the_key_tells_structures_apart() -> None:
     def digest(**tables: Any) -> str:
-        return cache.key(assemble(short(**tables)).loop, "1").digest
+        return cache.key(assemble(short(**tables)).loop, "1", "quiet").digest
 
     base = digest()
     assert digest() == base
@@ -379,7 +473,8 @@ def test_the_key_tells_structures_apart() -> None:
         digest(plant="paper_model"),
         digest(step=0.001),
         digest(sensors="ideal"),
-        cache.key(assemble(short()).loop, "2").digest,
+        cache.key(assemble(short()).loop, "2", "quiet").digest,
+        cache.key(assemble(short()).loop, "1", "recording").digest,
     ]
     assert len({base, *others}) == 1 + len(others)
 

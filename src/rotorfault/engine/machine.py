@@ -84,6 +84,13 @@ def aligned(shape: tuple[int, ...]) -> Array:
     return raw[skipped : skipped + count].reshape(shape)
 
 
+def aligned_copy(values: Array) -> Array:
+    """The same numbers, as `aligned`."""
+    out = aligned(values.shape)
+    out[:] = values
+    return out
+
+
 def grouped(rows: Array, lanes: int) -> Array:
     """Rows of flights (rows, N) in the machine's layout (groups, rows, lanes).
 

@@ -131,7 +131,8 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
     before, pieces, prepared = Code(lanes, "p"), [], 0
     for number, section in enumerate(traced.sections):
         wanted = section.signals if with_signals else []
-        writes = [*section.writes, *(("%out", row, term) for row, term in enumerate(wanted))]
+        changed = [(p, row, term) for p, row, term in section.writes if (term.op, *term.args) != (p[1:], row)]
+        writes = [*changed, *(("%out", row, term) for row, term in enumerate(wanted))]
         merged = merging(section.tape.terms, [*(term for _, _, term in section.writes), *section.signals])
         fixed = _fixed(term for _, _, term in writes)
         emitter = Emitter(before, {"par": Leaf("%par")}, {}, merged)

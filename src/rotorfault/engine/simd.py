@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, no_watch, noise_of
-from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
+from rotorfault.engine.machine import Machine, Machines, aligned, aligned_copy, grouped, ungrouped
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
 PATIENCE = 0.1  # s between two looks at progress
@@ -156,7 +156,7 @@ class _Block:
         while k < steps:
             wanted = (first + k) % every == 0
             until = k + 1 if wanted else min(steps, k + every - (first + k) % every)
-            piece = None if own is None else np.ascontiguousarray(own[:, k:until])
+            piece = None if own is None else aligned_copy(own[:, k:until])
             if wanted:
                 self._record(first + k, shared[k:until], piece)
             else:
