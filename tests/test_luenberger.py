@@ -25,7 +25,7 @@ from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.plant import FAULTS, PLANTS, WINDS, Plant
 from rotorfault.scenario import scenario_from
-from rotorfault.signals import Command
+from rotorfault.signals import Command, motion_of
 from rotorfault.telemetry import SIGNAL_NAMES
 from rotorfault.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
 from rotorfault.vehicle_file import load_vehicle
@@ -86,7 +86,17 @@ def watch(
         now = plant.observe(state, k * T, numbers).measurement
         thrust = expected_thrust(rotors, vehicle)
         speed = residual_speed(vehicle, rotor_speeds(vehicle, thrust))
-        inputs = DiagnosisInputs(now, before, vehicle, rotors.mean, thrust, speed, elapsed, PerRotor.all(math.nan))
+        inputs = DiagnosisInputs(
+            now,
+            motion_of(now),
+            motion_of(before),
+            vehicle,
+            rotors.mean,
+            thrust,
+            speed,
+            elapsed,
+            PerRotor.all(math.nan),
+        )
         memory, told = made.step(memory, inputs, parameters)
         rows.append([arr(told.residual), -arr(told.residual) / arr(thrust), arr(told.estimate), arr(told.flagged)])
         rotors = follow(rotors, command, vehicle, T)

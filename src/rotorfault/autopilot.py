@@ -14,9 +14,9 @@ from rotorfault.control.landing import Continue, Response, ResponseInputs
 from rotorfault.control.protocol import ControlInputs, Controller, ControlTelemetry, Prediction
 from rotorfault.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.diagnosis.rotor_model import RotorModel, expected_thrust, follow, rotors_at_hover
-from rotorfault.geometry import PerRotor, Vec3, body_z_axis, zeros
+from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.scalar import Scalar
-from rotorfault.signals import Allocation, Command, Diagnosis, Measurement, Reference, Wrench
+from rotorfault.signals import Allocation, Command, Diagnosis, Measurement, Motion, Reference, Wrench, motion_of
 from rotorfault.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 
 
@@ -33,7 +33,7 @@ class AutopilotMemory(NamedTuple):
     """All that the autopilot carries from one sampling instant to the next."""
 
     rotors: RotorModel
-    previous: Measurement
+    previous: Motion
     direct_acceleration_W: Vec3  # m/s^2: commanded last, zero without the option `six_inputs`
     elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
     diagnosis: Any
@@ -87,7 +87,7 @@ class Autopilot:
         """Memory before the first step; the rotors are believed at hover thrust."""
         return AutopilotMemory(
             rotors=rotors_at_hover(parameters.vehicle),
-            previous=measurement,
+            previous=motion_of(measurement),
             direct_acceleration_W=zeros(),
             elapsed=0.0,
             diagnosis=self.diagnoser.initial(measurement, parameters.diagnosis),
@@ -113,7 +113,7 @@ class Autopilot:
         dt : scalar, s
             The sampling period.
         """
-        vehicle = parameters.vehicle
+        vehicle, now = parameters.vehicle, motion_of(measurement)
         thrust_now = expected_thrust(memory.rotors, vehicle)
         speed = residual_speed(vehicle, rotor_speeds(vehicle, thrust_now))
 
@@ -121,6 +121,7 @@ class Autopilot:
             memory.diagnosis,
             DiagnosisInputs(
                 measurement,
+                now,
                 memory.previous,
                 vehicle,
                 memory.rotors.mean,
@@ -132,7 +133,7 @@ class Autopilot:
             parameters.diagnosis,
         )
         diagnosis = self.response.believed(memory.response, diagnosis)
-        prediction = predict(memory, measurement, diagnosis, vehicle, speed)
+        prediction = predict(memory, now, diagnosis, vehicle, speed)
         response_memory, decided = self.response.step(
             memory.response,
             ResponseInputs(
@@ -160,7 +161,7 @@ class Autopilot:
 
         after = AutopilotMemory(
             rotors=follow(memory.rotors, thrust, vehicle, dt),
-            previous=measurement,
+            previous=now,
             direct_acceleration_W=demanded.direct_acceleration_W,
             elapsed=dt,
             diagnosis=diagnosis_memory,
@@ -175,14 +176,14 @@ class Autopilot:
 
 
 def predict(
-    memory: AutopilotMemory, measurement: Measurement, diagnosis: Diagnosis, vehicle: Vehicle, speed: Scalar
+    memory: AutopilotMemory, now: Motion, diagnosis: Diagnosis, vehicle: Vehicle, speed: Scalar
 ) -> Prediction:
     """Velocity changes over the last period that the believed rotors, gravity, drag and gyroscopics explain."""
     before, dt = memory.previous, memory.elapsed
     wrench = wrench_of(vehicle, memory.rotors.mean * (1.0 - diagnosis.loss))
-    axis_W = (body_z_axis(before.attitude) + body_z_axis(measurement.attitude)) * 0.5
-    v_W = (before.v_W + measurement.v_W) * 0.5
-    omega_B = (before.omega_B + measurement.omega_B) * 0.5
+    axis_W = (before.axis_W + now.axis_W) * 0.5
+    v_W = (before.v_W + now.v_W) * 0.5
+    omega_B = (before.omega_B + now.omega_B) * 0.5
     J = vehicle.inertia
     acceleration_W = (
         axis_W * (wrench.thrust / vehicle.mass)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, overload
 
-from rotorfault.scalar import Scalar, asin, atan2, clip, cos, sin, sqrt
+from rotorfault.scalar import Scalar, atan2, cos, sin, sqrt
 
 
 class Value:
@@ -367,7 +367,7 @@ class Quat(Value):
     def euler(self) -> Vec3:
         """Euler angles (roll, pitch, yaw) in rad; pitch in [-pi/2, pi/2], where it is singular at the ends."""
         R = self.matrix()
-        return Vec3(atan2(R.zy, R.zz), asin(clip(-R.zx, -1.0, 1.0)), atan2(R.yx, R.xx))
+        return Vec3(atan2(R.zy, R.zz), atan2(-R.zx, sqrt(R.xx * R.xx + R.yx * R.yx)), atan2(R.yx, R.xx))
 
 
 def euler_matrix(euler: Vec3) -> Mat3:

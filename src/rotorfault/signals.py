@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.geometry import PerRotor, Vec3, body_z_axis, zeros
 from rotorfault.scalar import Scalar
 
 
@@ -28,6 +28,19 @@ class Measurement(NamedTuple):
     v_W: Vec3  # m/s
     attitude: Vec3  # rad: roll, pitch, yaw
     omega_B: Vec3  # rad/s; Euler rates where the plant is `paper_model`, which identifies the two
+
+
+class Motion(NamedTuple):
+    """What predictions need of a measurement; kept from one sampling instant to the next."""
+
+    v_W: Vec3  # m/s
+    omega_B: Vec3  # rad/s
+    axis_W: Vec3  # unit vector of the thrust
+
+
+def motion_of(measurement: Measurement) -> Motion:
+    """The motion that is measured."""
+    return Motion(measurement.v_W, measurement.omega_B, body_z_axis(measurement.attitude))
 
 
 class Reference(NamedTuple):

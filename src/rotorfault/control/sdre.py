@@ -18,7 +18,7 @@ from pydantic import Field, field_validator
 
 from rotorfault.config import Strict, Three
 from rotorfault.control.protocol import LawOutput, TrackingError
-from rotorfault.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain, position_gain
+from rotorfault.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain
 from rotorfault.geometry import Mat3, Vec3, zeros
 from rotorfault.scalar import Scalar, sqrt
 from rotorfault.vehicle import Vehicle
@@ -99,20 +99,30 @@ def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) ->
 
 def error_magnitude(e: Scalar, floor: Scalar, cap: Scalar) -> Scalar:
     """|e| floored and capped smoothly, in m."""
-    floored = sqrt(e * e + floor * floor)
-    return floored * cap / sqrt(floored * floored + cap * cap)
+    return 1.0 / sqrt(_inverse_square(e, floor, cap))
+
+
+def _inverse_square(e: Scalar, floor: Scalar, cap: Scalar) -> Scalar:
+    return 1.0 / (e * e + floor * floor) + 1.0 / (cap * cap)
 
 
 def position_gains(e: Vec3, parameters: SdreParameters) -> tuple[Vec3, Vec3]:
-    """Gains (k1, k2) of u = -k1 e - k2 e_dot per position axis, in 1/s^2 and 1/s."""
-    gains = []
+    """Gains (k1, k2) of u = -k1 e - k2 e_dot per position axis, in 1/s^2 and 1/s.
+
+    `rotorfault.control.riccati.position_gain` with the weights (35) put in: with s = 1/|e|, floored and capped,
+    k1 = sqrt(q/r) s^(3/2) and k2 = sqrt(q_rate/r s^2 + 2 k1), which take three roots and one quotient an axis.
+    """
     p = parameters
-    for e_i, floor, cap, q, q_rate, r in zip(
-        e, p.error_floor, p.error_cap, p.position_q, p.position_q_rate, p.position_r, strict=True
-    ):
-        size = error_magnitude(e_i, floor, cap)
-        gains.append(position_gain(q / size, q_rate, r * size * size))
-    return Vec3.of(k1 for k1, _ in gains), Vec3.of(k2 for _, k2 in gains)
+
+    def axis(e_i: Scalar, floor: Scalar, cap: Scalar, q: Scalar, q_rate: Scalar, r: Scalar) -> tuple[Scalar, Scalar]:
+        square = _inverse_square(e_i, floor, cap)
+        s = sqrt(square)
+        k1 = sqrt(q / r) * (s * sqrt(s))
+        return k1, sqrt(q_rate / r * square + 2.0 * k1)
+
+    numbers = (p.error_floor, p.error_cap, p.position_q, p.position_q_rate, p.position_r)
+    k1, k2 = zip(*(axis(*values) for values in zip(e, *numbers, strict=True)), strict=True)
+    return Vec3.of(k1), Vec3.of(k2)
 
 
 def attitude_gains(

@@ -43,7 +43,7 @@ from rotorfault.diagnosis.decision import (
 from rotorfault.diagnosis.protocol import DIAGNOSES, DiagnosisInputs
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3, zeros
-from rotorfault.scalar import Scalar, cos, maximum
+from rotorfault.scalar import Scalar, maximum
 from rotorfault.signals import Diagnosis, Measurement, Wrench
 from rotorfault.vehicle import Vehicle, gyroscopic_torque, wrench_of
 
@@ -193,8 +193,8 @@ class Luenberger:
         turn = wrench.torque_B.over(vehicle.inertia)
         if self.settings.form != "injected":
             return 1.0, lift - vehicle.gravity, turn
-        before, now = inputs.previous, inputs.measurement
-        cosine = 0.5 * (_cos_tilt(before) + _cos_tilt(now))
+        before, now = inputs.previous, inputs.now
+        cosine = 0.5 * (before.axis_W.z + now.axis_W.z)
         climb = 0.5 * (before.v_W.z + now.v_W.z)
         omega_B = (before.omega_B + now.omega_B) * 0.5
         J = vehicle.inertia
@@ -204,7 +204,3 @@ class Luenberger:
             cosine * lift - vehicle.gravity - vehicle.linear_drag / vehicle.mass * climb,
             turn + gyroscopic.over(J),
         )
-
-
-def _cos_tilt(measurement: Measurement) -> Scalar:
-    return cos(measurement.attitude.x) * cos(measurement.attitude.y)

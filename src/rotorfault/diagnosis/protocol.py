@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 from rotorfault.geometry import PerRotor
 from rotorfault.registry import Registry
 from rotorfault.scalar import Scalar
-from rotorfault.signals import Diagnosis, Measurement
+from rotorfault.signals import Diagnosis, Measurement, Motion
 from rotorfault.vehicle import Vehicle
 
 
@@ -15,7 +15,8 @@ class DiagnosisInputs(NamedTuple):
     """All that a source of diagnosis may use at one sampling instant."""
 
     measurement: Measurement
-    previous: Measurement  # one period earlier; the same as `measurement` at the first step
+    now: Motion  # as measured
+    previous: Motion  # one period earlier; the same as `now` at the first step
     vehicle: Vehicle  # belief
     mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the last period
     thrust: PerRotor  # N: thrust of sound rotors now

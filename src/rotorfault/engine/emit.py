@@ -74,6 +74,28 @@ class Emitter:
         self._numbers: dict[int, str] = {}
         self._masks: dict[int, str] = {}
 
+    def write_all(self, outputs: Iterable[Term]) -> None:
+        """Write all that some outputs need, in the order in which it was traced.
+
+        What an equation needs was mostly computed just before it, so that fewer values wait in memory for their use
+        than in an order found output by output.
+        """
+        needed: set[int] = set()
+        todo = list(outputs)
+        while todo:
+            term = todo.pop()
+            if term.op == "const" or term.index in needed:
+                continue
+            needed.add(term.index)
+            if term.index not in self._given:
+                todo += [a for a in self._needed(term) if isinstance(a, Term)]
+        tape = next(iter(outputs)).tape if needed else None
+        for index in sorted(needed):
+            assert tape is not None
+            term = tape.terms[index]
+            if isinstance(term.args[0], Term) and index not in self._given:
+                self._write(term)
+
     def number(self, term: Term) -> str:
         """The name of a term's value."""
         self._write(term)

@@ -140,6 +140,7 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
             before.store(emitter.number(term), "%out", (prepared + row) * lanes)
         code = Code(lanes, f"s{number}v")
         emitter = Emitter(code, leaves, {term.index: prepared + row for row, term in enumerate(fixed)}, merged)
+        emitter.write_all([term for _, _, term in writes])
         named = [(pointer, row, emitter.number(term)) for pointer, row, term in writes]
         for pointer, row, name in named:  # last of all: nothing of the step may read what it writes
             code.store(name, pointer, row * lanes)

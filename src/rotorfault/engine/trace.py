@@ -220,7 +220,23 @@ def function(name: str, *arguments: Operand) -> Term:
     numbers = [term.value for term in lifted]
     if all(number is not None for number in numbers):
         return tape.constant(_FUNCTIONS[name](*numbers))
+    if name in ("sin", "cos") and lifted[0].op == "atan2":
+        return _of_an_arc_tangent(name, *lifted[0].args)
     return tape.term(name, *lifted)
+
+
+def _of_an_arc_tangent(name: str, y: Term, x: Term) -> Term:
+    """Sine or cosine of the angle of the point (x, y): a leg of the triangle over its hypotenuse.
+
+    Attitudes are taken apart into angles by who measures and put together again by who controls; with perfect sensors
+    nothing of that need be computed.
+    """
+    square = x * x + y * y
+    at_origin = less_equal(square, 0.0)  # not at NaN, which must come through
+    over = 1.0 / function("sqrt", square)
+    if name == "sin":
+        return y.tape.lift(select(at_origin, 0.0, y * over))
+    return y.tape.lift(select(at_origin, 1.0, x * over))
 
 
 def less(a: Operand, b: Operand) -> Term:

@@ -32,7 +32,7 @@ def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> Per
 
 def delivered_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
     """Thrusts in N that act on the body, for lag outputs in N."""
-    followed = output * fault.effectiveness * vehicle.rotor_gain
+    followed = output * (fault.effectiveness * vehicle.rotor_gain)
     return fault.stuck.map(select, fault.stuck_thrust, followed)
 
 
