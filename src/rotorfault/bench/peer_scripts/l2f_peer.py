@@ -224,11 +224,11 @@ def main() -> None:
         common.must(result["model_difference"] < 1e-4, "l2f does not follow the equations that it publishes")
     result["note"] = (
         "Compiled on this machine at its installation. Its controller is foundation-policy "
-        f"{version('foundation-policy')}, a small recurrent network, which costs more than the plant: the plant alone "
-        "is reported too. Batches have its fixed sizes, the headline is of 8,192. The manoeuvre is a closed-loop "
-        "flight along a smooth path, the policy sampled at 100 Hz; as l2f does not give out its derivative, its truth "
-        f"is its published equations in float64 with RK4 at {PERIOD / TRUTH_PARTS * 1e6:.0f} µs, which agree with l2f step by step to its rounding "
-        "(model_difference)."
+        f"{version('foundation-policy')}, a small recurrent network, which costs more than the plant: the plant "
+        "alone is reported too. Batches have its fixed sizes, the headline is of 8,192. The manoeuvre is a "
+        "closed-loop flight along a smooth path, the policy sampled at 100 Hz. As l2f does not give out its "
+        "derivative, its truth is its published equations in float64 with RK4 at "
+        f"{PERIOD / TRUTH_PARTS * 1e6:.0f} µs; they agree with l2f step by step to its rounding (model_difference)."
     )
     common.write(task.json, result)
 
