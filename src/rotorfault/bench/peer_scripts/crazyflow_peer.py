@@ -21,7 +21,7 @@ FREQUENCY = 500  # Hz, crazyflow's default of the dynamics and of its attitude c
 STATE_FREQUENCY = 100  # Hz, its default of the position controller
 CHUNK = 100  # steps of one compiled call, 0.2 s of flight with one set point
 HEIGHT = 1.0  # m, away from its floor
-TRUTH_FREQUENCY = 32_000  # Hz, in double precision
+TRUTH_FREQUENCY = 8_000  # Hz, in double precision
 
 
 def simulation(worlds: int, integrator: str, frequency: int = FREQUENCY, cores: int = 1) -> Any:
