@@ -30,10 +30,10 @@ check-python:
 	$(PIP) install --quiet -c constraints.txt -e '.[test,dev,flightcode]'
 	@touch $@
 
-# Without heyoka, as on systems that it has no wheels for. --no-deps, for rotorfault itself asks for it on Linux.
+# Without llvmlite, as on systems that it has no wheels for. --no-deps, for rotorfault itself asks for it.
 .venv-numpy/.stamp: pyproject.toml constraints.txt | check-python
 	$(PYTHON) -m venv .venv-numpy
-	grep -v '^heyoka' constraints.txt > .venv-numpy/requirements.txt
+	grep -v -e '^llvmlite' -e '^heyoka' constraints.txt > .venv-numpy/requirements.txt
 	$(NUMPY_PIP) install --quiet -r .venv-numpy/requirements.txt
 	$(NUMPY_PIP) install --quiet --no-deps -e .
 	@touch $@
@@ -46,7 +46,7 @@ paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and cl
 test: .venv/.stamp-develop ## Run the tests
 	.venv/bin/python -m pytest -n 2
 
-test-numpy: .venv-numpy/.stamp ## Run the tests without heyoka, in .venv-numpy
+test-numpy: .venv-numpy/.stamp ## Run the tests without llvmlite, in .venv-numpy
 	.venv-numpy/bin/python -m pytest -n 2
 
 lint: .venv/.stamp-develop ## Check style and format with ruff

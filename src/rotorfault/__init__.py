@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rotorfault.errors import InputError
     from rotorfault.flight import Flight, fly, fly_all, load, repeat
     from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3
+    from rotorfault.many import Flights, fly_many
     from rotorfault.neighbours import neighbour
     from rotorfault.scenario import Scenario, load_scenario, scenario_names
     from rotorfault.signals import Measurement, Reference, Wrench
@@ -35,6 +36,7 @@ _HOME = {
     "ControlOutput": "control.protocol",
     "Controller": "control.protocol",
     "Flight": "flight",
+    "Flights": "many",
     "InputError": "errors",
     "Mat3": "geometry",
     "Measurement": "signals",
@@ -47,6 +49,7 @@ _HOME = {
     "Wrench": "signals",
     "fly": "flight",
     "fly_all": "flight",
+    "fly_many": "many",
     "load": "flight",
     "load_scenario": "scenario",
     "load_vehicle": "vehicle_file",
@@ -64,6 +67,7 @@ __all__ = [
     "ControlOutput",
     "Controller",
     "Flight",
+    "Flights",
     "InputError",
     "Mat3",
     "Measurement",
@@ -77,6 +81,7 @@ __all__ = [
     "__version__",
     "fly",
     "fly_all",
+    "fly_many",
     "load",
     "load_scenario",
     "load_vehicle",

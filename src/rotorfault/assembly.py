@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rotorfault.autopilot import Autopilot
-from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, Start
-from rotorfault.engine.batch import FIRST_GUST, SENSOR_NOISE, Array, Batch, Noise, Stream
+from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, Start
+from rotorfault.engine.batch import FIRST_GUST, SENSOR_NOISE, Array, Batch, Noise, Stream, columns, no_reference
 from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3
@@ -17,9 +17,10 @@ from rotorfault.plant import PLANTS, Ground, no_first_normals, no_noise
 from rotorfault.plant.plant import Plant
 from rotorfault.records import flatten, unflatten
 from rotorfault.reference import ReferenceTable
+from rotorfault.scalar import maximum
 from rotorfault.scenario import Scenario
 from rotorfault.scoring import AT_LIMIT, SETTLED, TRACKED, ScoringParameters, bands
-from rotorfault.signals import Reference
+from rotorfault.vehicle import Vehicle
 
 R = TypeVar("R")
 
@@ -38,7 +39,24 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
     InputError
         If the reference is not finite, or a part cannot be made for this vehicle and sampling period.
     """
-    vehicle = scenario.vehicle.vehicle
+    loop = build(scenario, controller)
+    reference = reference_of(scenario)
+    parameters = LoopParameters(
+        plant=loop.plant.parameters(scenario.mismatch.applied(scenario.vehicle.vehicle)),
+        autopilot=loop.autopilot.parameters(scenario.vehicle.vehicle, scenario.period),
+        sensors=loop.sensors.parameters(),
+        period=scenario.period,
+        scoring=scoring_parameters(
+            np.array(scenario.start.position), scenario.vehicle.vehicle, scenario.ground, reference
+        ),
+    )
+    seeds = ((scenario.seed, 0),)
+    state = initial_state(loop, start_of(scenario), reference, seeds, parameters)
+    return Batch(loop, state, parameters, reference, 1, seeds, scenario.every)
+
+
+def build(scenario: Scenario, controller: Any = None) -> ClosedLoop:
+    """The parts of a scenario put together; see `assemble`."""
     plant = Plant(
         PLANTS[scenario.plant](),
         scenario.wind.make(),
@@ -46,39 +64,48 @@ def assemble(scenario: Scenario, controller: Any = None) -> Batch:
         scenario.substeps,
         None if scenario.ground is None else Ground(scenario.ground),
     )
-    sensors = scenario.sensors.make()
     autopilot = Autopilot(
         scenario.diagnosis.make(),
         scenario.controller.make() if controller is None else controller,
         scenario.allocation.make(),
         scenario.on_fault.make(),
     )
-    loop = ClosedLoop(plant, sensors, autopilot)
+    return ClosedLoop(plant, scenario.sensors.make(), autopilot)
+
+
+def reference_of(scenario: Scenario) -> Array:
+    """Rows (steps, 12) of `Reference`, one for each sampling instant.
+
+    Raises
+    ------
+    InputError
+        If one is not finite.
+    """
     times = np.arange(scenario.steps) * scenario.period
     with np.errstate(all="ignore"):
-        table = scenario.reference.make().table(times)
-    rows = reference_rows(table)
+        rows = reference_rows(scenario.reference.make().table(times))
     wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(wrong):
         raise InputError(
             f"reference: position, velocity or acceleration at t = {times[wrong[0]]:g} s is not finite; "
             "its numbers are too large, or its times too short"
         )
-    seeds = ((scenario.seed, 0),)
-    parameters = LoopParameters(
-        plant=plant.parameters(scenario.mismatch.applied(vehicle)),
-        autopilot=autopilot.parameters(vehicle, scenario.period),
-        sensors=sensors.parameters(),
-        period=scenario.period,
-        scoring=scoring_parameters(scenario, rows),
-    )
-    start = _start(scenario)
-    if plant.wind.needs_noise:
+    return rows
+
+
+def initial_state(
+    loop: ClosedLoop, start: Start, reference: Array, seeds: tuple[tuple[int, int], ...], parameters: LoopParameters
+) -> LoopState:
+    """State before the first step, for one flight or, with leaves of N numbers, for N."""
+    if loop.plant.wind.needs_noise:
         start = start._replace(gust=_first_noise(no_first_normals(), seeds, FIRST_GUST))
-    noise = _first_noise(no_noise(), seeds, SENSOR_NOISE) if sensors.needs_noise else no_noise()
-    drive = Drive(_first(table), noise)
-    state = loop.initial(start, drive, parameters)
-    return Batch(loop, state, parameters, rows, 1, seeds, scenario.every)
+    noise = _first_noise(no_noise(), seeds, SENSOR_NOISE) if loop.sensors.needs_noise else no_noise()
+    first = unflatten(no_reference(), reference[0].tolist())
+    # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
+    # must begin the same alone and in any batch.
+    many = unflatten(start, list(columns(start, len(seeds))))
+    state = loop.initial(many, Drive(first, noise), parameters)
+    return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
 
 
 def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
@@ -109,25 +136,31 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     )
 
 
-def scoring_parameters(scenario: Scenario, reference: Array) -> ScoringParameters:
+def scoring_parameters(
+    position: Array, vehicle: Vehicle, ground: float | None, reference: Array
+) -> ScoringParameters:
     """What scoring needs to know of a flight.
 
     Parameters
     ----------
-    scenario : Scenario
+    position : ndarray, shape (..., 3)
+        Where it begins, in m.
+    vehicle : Vehicle
+        As the autopilot believes it to be.
+    ground : float or None
+        Height of the ground in m.
     reference : ndarray, shape (steps, 12)
         Rows of `Reference`.
     """
-    start, vehicle = np.array(scenario.start.position), scenario.vehicle.vehicle
-    margin = AT_LIMIT * max(1.0, vehicle.thrust_max)
-    settle, track = (bands(reference[:, :3], start, share).tolist() for share in (SETTLED, TRACKED))
+    margin = AT_LIMIT * maximum(1.0, vehicle.thrust_max)
+    settle, track = (np.moveaxis(bands(reference[:, :3], position, share), -1, 0) for share in (SETTLED, TRACKED))
     return ScoringParameters(
         settle_band=Vec3.of(settle),
         track_band=Vec3.of(track),
         half=float(len(reference) // 2),
         command_low=vehicle.thrust_min + margin,
         command_high=vehicle.thrust_max - margin,
-        ground=0.0 if scenario.ground is None else scenario.ground,
+        ground=0.0 if ground is None else ground,
     )
 
 
@@ -136,17 +169,14 @@ def _stacked(template: Any, records: list[Any]) -> Any:
     return unflatten(template, list(rows))
 
 
-def _start(scenario: Scenario) -> Start:
+def start_of(scenario: Scenario) -> Start:
+    """Where a flight begins."""
     s = scenario.start
     return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
 
 
-def _first(table: ReferenceTable) -> Reference:
-    return unflatten(table.at(0), [float(leaf) for leaf in flatten(table.at(0))])
-
-
 def _first_noise(template: R, seeds: tuple[tuple[int, int], ...], stream: Stream) -> R:
-    return unflatten(template, Noise(seeds, stream).draw(1)[0, :, 0].tolist())
+    return unflatten(template, list(Noise(seeds, stream).draw(1)[0]))
 
 
 def reference_rows(table: ReferenceTable) -> Array:

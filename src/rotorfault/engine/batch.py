@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -97,7 +97,7 @@ class Noise:
         """Numbers of the next steps, shape (steps, numbers of the stream, N)."""
         return np.stack(list(self.each(steps)), axis=2)
 
-    def only(self, flights: Sequence[int]) -> Noise:
+    def only(self, flights: Iterable[int]) -> Noise:
         """The generators of some of the flights, where they are."""
         some = Noise(())
         some.width, some._generators = self.width, [self._generators[i] for i in flights]
@@ -127,14 +127,18 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
             yield first, np.concatenate([shared, *(part.draw(len(reference)) for part in noise)], axis=1)
 
 
+def no_reference() -> Reference:
+    """The origin, at rest."""
+    zero = zeros()
+    return Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
+
+
 def drive_template(batch: Batch) -> Any:
     """A record of the shape that the rows of `drive_rows` flatten: a drive, empty where nothing is drawn."""
-    zero = zeros()
-    reference = Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
     loop = batch.loop
     sensors: Any = no_noise() if loop.sensors.needs_noise else ()
-    gust: Any = zero if loop.plant.wind.needs_noise else ()
-    return Drive(reference, sensors, gust)
+    gust: Any = zeros() if loop.plant.wind.needs_noise else ()
+    return Drive(no_reference(), sensors, gust)
 
 
 def as_drive(record: Any) -> Drive:
@@ -204,5 +208,5 @@ class Records:
         """All of them; KeyboardInterrupt if it came before the first."""
         if interrupted and self._filled == 0:
             raise KeyboardInterrupt
-        steps = np.arange(self._filled) * float(self.every)
+        steps: Array = np.arange(self._filled, dtype=np.float64) * float(self.every)
         return Recording(self._signals[: self._filled], steps, state, flown, interrupted)

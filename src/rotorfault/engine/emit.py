@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from rotorfault.engine import elementary
 from rotorfault.engine.code import Code
 from rotorfault.engine.trace import Term
 
-_FUNCTIONS = {
+_FUNCTIONS: dict[str, Callable[..., str]] = {
     "sin": elementary.sine,
     "cos": elementary.cosine,
     "tan": elementary.tangent,
@@ -179,19 +179,18 @@ class Emitter:
             if args[1].index in self._merging.divisors:
                 return code.op("fmul", numbers[0], code.op("fdiv", code.constant(1.0), numbers[1]))
             return code.op("fdiv", *numbers)
-        simple = {
-            "neg": code.negative, "sqrt": code.square_root, "abs": code.magnitude,
-            "min": code.minimum, "max": code.maximum, "round": code.nearest,
+        simple: dict[str, Callable[..., str]] = {
+            "neg": code.negative, "sqrt": code.square_root, "abs": code.magnitude, "min": code.minimum,
+            "max": code.maximum, "round": code.nearest,
         }  # fmt: skip
-        if op in simple:
-            return simple[op](*numbers)  # type: ignore[operator]
-        return _FUNCTIONS[op](code, *numbers)  # type: ignore[operator]
+        return simple[op](*numbers) if op in simple else _FUNCTIONS[op](code, *numbers)
 
     def _sum(self, op: str, a: Term, b: Term) -> str:
         code, products = self.code, self._merging.products
         if a.index in products:
             c = self._number(b)
-            return code.fma(*map(self._number, a.args), c if op == "add" else code.negative(c))
+            first, second = map(self._number, a.args)
+            return code.fma(first, second, c if op == "add" else code.negative(c))
         if b.index in products:
             first, second = map(self._number, b.args)
             return code.fma(first if op == "add" else code.negative(first), second, self._number(a))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorfault.closed_loop import LoopState
 from rotorfault.engine.batch import (
+    Array,
     Batch,
     Recording,
     Records,
@@ -34,7 +36,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
     missing = [np.nan] * len(SIGNAL_NAMES)
     records, done, interrupted, over = Records(batch), 0, False, over_row(batch)
 
-    def state() -> np.ndarray:
+    def state() -> Array:
         return np.array([[float(leaf) for leaf in flatten(one)] for one in states]).T
 
     try:
@@ -63,7 +65,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
     return records.recording(state(), done * batch.flights, interrupted)
 
 
-def _diverged(state, step):  # type: ignore[no-untyped-def]
+def _diverged(state: LoopState, step: int) -> LoopState:
     """The same flight, over: it has no numbers from this step on."""
     if state.scores.over != 0.0:
         return state

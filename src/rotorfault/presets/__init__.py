@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from importlib import resources
 from typing import Any
 
@@ -15,8 +16,9 @@ from rotorfault.registry import unknown
 DEFAULT = "tuned"
 
 
+@lru_cache
 def presets(controller: str) -> dict[str, Any]:
-    """All presets of a controller; empty for one without a file."""
+    """All presets of a controller; empty for one without a file. Not to be changed: they are read once."""
     file = resources.files("rotorfault.presets") / f"{controller}.toml"
     if not file.is_file():
         return {}

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from rotorfault.geometry import PerRotor
-from rotorfault.metrics import SETTLED, attitude_error, cost
+from rotorfault.metrics import attitude_error, cost
+from rotorfault.scoring import SETTLED
 from rotorfault.scenario import Scenario, scenario_from
 from rotorfault.vehicle import Vehicle, wrench_of
 
