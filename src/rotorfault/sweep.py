@@ -182,7 +182,7 @@ class _Assembly:
             np.stack([self.columns[key] for key in keys]), axis=1, return_index=True, return_inverse=True
         )
         about = Scenario.model_fields[field]
-        kind: Any = Annotated[(about.annotation, *about.metadata, Field())]  # type: ignore[misc]
+        kind: Any = Annotated[(about.annotation, *about.metadata, Field())]
         adapter: TypeAdapter[Any] = TypeAdapter(kind)
         made = []
         for numbers, flight in zip(values.T.tolist(), first, strict=True):

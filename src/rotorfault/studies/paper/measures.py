@@ -17,8 +17,8 @@ from scipy.signal import welch
 
 from rotorfault.geometry import PerRotor
 from rotorfault.metrics import attitude_error, cost
-from rotorfault.scoring import SETTLED
 from rotorfault.scenario import Scenario, scenario_from
+from rotorfault.scoring import SETTLED
 from rotorfault.vehicle import Vehicle, wrench_of
 
 LABEL = "1"  # version of what `measure` gives
