@@ -39,6 +39,10 @@ class _Floats:
         return math.sqrt(x) if x >= 0.0 else NAN
 
     @staticmethod
+    def reciprocal(x: float) -> float:
+        return 1.0 / x if x != 0.0 else math.copysign(math.inf, x)
+
+    @staticmethod
     def exp(x: float) -> float:
         return math.exp(x) if not x > 709.0 else math.inf
 
@@ -81,6 +85,10 @@ class _Arrays:
     asin, atan2, tanh = np.arcsin, np.arctan2, np.tanh
 
     @staticmethod
+    def reciprocal(x: Scalar) -> Scalar:
+        return 1.0 / x
+
+    @staticmethod
     def less(a: Scalar, b: Scalar) -> Scalar:
         return np.less(a, b).astype(float)
 
@@ -102,6 +110,7 @@ class _Heyoka:
         self._atan2, self._cos, self._tan = module.atan2, module.cos, module.tan
         self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "asin", "tanh")}
         self._sqrt = module.sqrt
+        self._one = module.expression(1.0)
 
     def __getattr__(self, name: str) -> Any:
         # Plain one-argument functions need no adaptation: dispatch has seen that the argument is an expression.
@@ -109,6 +118,11 @@ class _Heyoka:
 
     def sqrt(self, x: Scalar) -> Scalar:
         return self._sqrt(x)
+
+    def reciprocal(self, x: Scalar) -> Scalar:
+        # heyoka turns every product with a bare 1/x into a division of its own. A select of constant condition
+        # hides it from heyoka; LLVM then drops the select.
+        return self._select(self._one, 1.0 / x, x)
 
     def cos(self, x: Scalar) -> Scalar:
         return self._lane_by_lane(self._cos, x)
@@ -148,6 +162,10 @@ class _Casadi:
         self.sqrt, self.exp, self.sin, self.cos = module.sqrt, module.exp, module.sin, module.cos
         self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
         self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
+
+    @staticmethod
+    def reciprocal(x: Scalar) -> Scalar:
+        return 1.0 / x
 
 
 _FLOATS, _ARRAYS = _Floats(), _Arrays()
@@ -191,6 +209,11 @@ def _of(*arguments: Scalar) -> Any:
 def sqrt(x: Scalar) -> Scalar:
     """Square root; NaN below zero."""
     return _of(x).sqrt(x)
+
+
+def reciprocal(x: Scalar) -> Scalar:
+    """1/x, and infinity at zero, where a division of Python floats would raise."""
+    return _of(x).reciprocal(x)
 
 
 def exp(x: Scalar) -> Scalar:
