@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from rotorfault.control.riccati import (
     attitude_problem,
     guaranteed_gain,
     newton_kleinman_step,
+    routh_stable,
 )
 from rotorfault.geometry import Mat3, Vec3
 from rotorfault.records import flatten, unflatten
@@ -66,10 +68,48 @@ def rightmost(problem: AttitudeProblem, gain: Gain) -> np.ndarray:
     return found
 
 
+def exactly_stable(problem: AttitudeProblem, gain: Gain) -> bool:
+    """Routh's test in exact rational arithmetic, for gains so large that eigenvalues err by more than their size."""
+    Y, X, W = (np.array([Fraction(float(x)) for x in M]).reshape(3, 3) for M in (gain.Y, gain.X, problem.W))
+    one_, zero = np.vectorize(Fraction)(np.eye(3, dtype=int)), np.vectorize(Fraction)(np.zeros((3, 3), dtype=int))
+    A = np.block([[zero, one_], [-Y, W - X]])
+    # Faddeev and LeVerrier's characteristic polynomial.
+    M, coefficients = A * 0, [Fraction(1)]
+    for k in range(1, 7):
+        M = A @ M + coefficients[-1] * np.vectorize(Fraction)(np.eye(6, dtype=int))
+        coefficients.append(-np.trace(A @ M) / k)
+    above, row = coefficients[0::2], coefficients[1::2]
+    while row and row[0] > 0:
+        padded = [*row[1:], Fraction(0)]
+        above, row = row, [a - above[0] / row[0] * b for a, b in zip(above[1:], padded, strict=False)]
+    return not row
+
+
+def on_the_verge(rng: np.random.Generator, problem: AttitudeProblem, n: int) -> Gain:
+    """Gains next to the border of stability, at relative distances from 1e-15 to 0.1, on both sides."""
+    right, wild = converged(problem), Gain(noise(rng, n, 0, 3), noise(rng, n, 0, 2))
+    inside, outside = np.zeros(n), np.ones(n)
+    for _ in range(48):
+        middle = 0.5 * (inside + outside)
+        stable = routh_stable(problem, Gain(right.Y + wild.Y * middle, right.X + wild.X * middle)) == 1.0
+        inside, outside = np.where(stable, middle, inside), np.where(stable, outside, middle)
+    share = inside * (1.0 + 10 ** rng.uniform(-15, -1, n) * rng.choice([-1, 1], n))
+    return Gain(right.Y + wild.Y * share, right.X + wild.X * share)
+
+
+def cost_is_positive(problem: AttitudeProblem, gain: Gain, after: Gain) -> np.ndarray:
+    """Whether the cost matrix of a gain, whose lower half is the gain `after` it, is positive definite."""
+    Y, K, W, N, X = np.broadcast_arrays(*map(stack, (*gain, problem.W, *after)))
+    T = (0, 2, 1)
+    P = np.block([[N.transpose(T) @ (K - W) + Y.transpose(T) @ (X - K), N.transpose(T)], [N, X]])
+    d = 1.0 / np.sqrt(np.abs(np.diagonal(P, axis1=1, axis2=2)))
+    return np.linalg.eigvalsh(d[:, :, None] * P * d[:, None, :]).min(1) > 0.0
+
+
 def converged(problem: AttitudeProblem, steps: int = 30) -> Gain:
     gain = guaranteed_gain(problem)
     for _ in range(steps):
-        gain, _ = newton_kleinman_step(problem, gain)
+        gain = newton_kleinman_step(problem, gain)
     return gain
 
 

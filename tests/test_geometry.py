@@ -148,7 +148,12 @@ def test_matrix_operations_agree_with_numpy(m: Mat3, n: Mat3, v: Vec3) -> None:
     np.testing.assert_allclose(m.det(), np.linalg.det(M), atol=1e-10)
     np.testing.assert_allclose(array(m @ m.adjugate()), m.det() * np.eye(3), atol=1e-9)
     np.testing.assert_allclose(m.norm(), np.linalg.norm(M), atol=1e-12)
-    np.testing.assert_allclose(array(Mat3.columns(*m.rows)), M.T)
+    np.testing.assert_array_equal(array(m.times(n)), M * N)
+
+
+def test_the_inverse_of_a_singular_matrix_is_not_finite() -> None:
+    singular = Mat3(1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 1.0, 0.0, 1.0)
+    assert not np.isfinite(array(singular.inverse())).any()
 
 
 @pytest.mark.parametrize(

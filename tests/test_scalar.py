@@ -13,7 +13,10 @@ from rotorfault import scalar
 
 NAN, INF = math.nan, math.inf
 
-ONE = ("sqrt", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "nearest", "wrap_angle")
+ONE = (
+    "sqrt", "reciprocal", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "nearest",
+    "wrap_angle",
+)  # fmt: skip
 TWO = ("atan2", "minimum", "maximum")
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal")
 CONDITIONS_2 = ("both", "either")
@@ -21,6 +24,7 @@ CONDITIONS_2 = ("both", "either")
 NUMBERS = [-3.5, -1.0, -0.3, 0.0, 1e-12, 0.3, 1.0, 2.0, 40.0]
 EXPECTED: dict[str, Callable[..., float]] = {
     "sqrt": lambda x: math.sqrt(x) if x >= 0 else NAN,
+    "reciprocal": lambda x: 1.0 / x if x != 0.0 else math.copysign(INF, x),
     "exp": math.exp,
     "sin": math.sin,
     "cos": math.cos,
@@ -117,7 +121,7 @@ def test_every_function_of_the_module_is_tested_here() -> None:
 @pytest.mark.parametrize("name", sorted(EXPECTED))
 def test_agrees_with_the_definition(engine: Callable[..., np.ndarray], name: str) -> None:
     rows = arguments(name)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         got = engine(getattr(scalar, name), rows)
     want = np.array([EXPECTED[name](*map(float, row)) for row in rows])
     np.testing.assert_allclose(got, want, rtol=4e-15, atol=4e-15)
@@ -168,6 +172,7 @@ def test_floats_never_raise_where_ieee_arithmetic_gives_nan_or_infinity() -> Non
     assert math.isnan(scalar.sqrt(-1.0))
     assert math.isnan(scalar.asin(1.0000001))
     assert scalar.exp(1000.0) == INF
+    assert scalar.reciprocal(-0.0) == -INF
     assert scalar.exp(-1000.0) == 0.0
     for function in (scalar.sin, scalar.cos, scalar.tan):
         assert math.isnan(function(INF))
@@ -177,6 +182,14 @@ def test_floats_never_raise_where_ieee_arithmetic_gives_nan_or_infinity() -> Non
 def test_numpy_scalars_count_as_floats() -> None:
     assert scalar.maximum(np.float64(1.0), 2) == 2.0
     assert scalar.sqrt(np.float32(4.0)) == 2.0
+
+
+def test_a_reciprocal_divides_once_however_often_it_is_used() -> None:
+    hy = pytest.importorskip("heyoka")
+    x, y, z = (hy.expression(name) for name in "xyz")
+    inverse = scalar.reciprocal(x)
+    operations = [str(part) for part in hy.cfunc([y * inverse, z * inverse], [x, y, z]).dc]
+    assert sum("**-1" in part or "div" in part for part in operations) == 1
 
 
 def test_refuses_what_is_no_scalar() -> None:

@@ -131,7 +131,7 @@ def test_poles_of_constant_gains_are_known(paper_vehicle: Vehicle, spring: Linea
 
 
 def test_what_does_not_act_is_left_out(spring: LinearLoop) -> None:
-    assert {"steps", "autopilot.elapsed", "autopilot.previous.p_W.x"} <= set(spring.left_out)
+    assert {"steps", "autopilot.elapsed", "scores.cost"} <= set(spring.left_out)
     assert not [name for name in spring.left_out if name.startswith("plant.")]
     assert spring.residual < 1e-10
 

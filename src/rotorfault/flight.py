@@ -296,8 +296,8 @@ def _flight(
     kind = KINDS[int(scores.over)]
     if kind != "flying":
         outcome = Outcome(kind, float(scores.end) * scenario.period)
-        # The record of the end itself is kept where it has numbers, and the first in any case.
-        end = int(np.searchsorted(recording.steps, scores.end, side="right"))
+        # The record of the end itself (the first from it on) is kept where it has numbers, and the first in any case.
+        end = min(int(np.searchsorted(recording.steps, scores.end)) + 1, len(times))
         end = max(1, end - (1 if not np.isfinite(signals[end - 1]).all() else 0))
     else:
         end = len(times)

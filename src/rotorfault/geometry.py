@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, overload
 
-from rotorfault.scalar import Scalar, atan2, cos, sin, sqrt
+from rotorfault.scalar import Scalar, atan2, cos, reciprocal, sin, sqrt
 
 
 class Value:
@@ -128,11 +128,6 @@ class Mat3(Value):
         """The matrix S with S u = v x u."""
         return cls(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 
-    @classmethod
-    def columns(cls, a: Vec3, b: Vec3, c: Vec3) -> Mat3:
-        """Matrix with the given columns."""
-        return cls(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
-
     @property
     def T(self) -> Mat3:
         """Transpose."""
@@ -195,6 +190,10 @@ class Mat3(Value):
             m.zx * n.xz + m.zy * n.yz + m.zz * n.zz,
         )
 
+    def times(self, other: Mat3) -> Mat3:
+        """Elementwise product."""
+        return Mat3(*(a * b for a, b in zip(self, other, strict=True)))
+
     def trace(self) -> Scalar:
         """Sum of the diagonal."""
         return self.xx + self.yy + self.zz
@@ -214,16 +213,16 @@ class Mat3(Value):
         )
 
     def det(self) -> Scalar:
-        """Determinant."""
+        """Determinant, by minors as `adjugate` has them: a compiled function computes them once."""
         return (
             self.xx * (self.yy * self.zz - self.yz * self.zy)
-            - self.xy * (self.yx * self.zz - self.yz * self.zx)
+            + self.xy * (self.yz * self.zx - self.yx * self.zz)
             + self.xz * (self.yx * self.zy - self.yy * self.zx)
         )
 
     def inverse(self) -> Mat3:
-        """Inverse by the adjugate; not for near-singular matrices."""
-        inverse: Mat3 = self.adjugate() * (1.0 / self.det())
+        """Inverse by the adjugate, not for near-singular matrices; not finite where the determinant is zero."""
+        inverse: Mat3 = self.adjugate() * reciprocal(self.det())
         return inverse
 
     def norm(self) -> Scalar:

@@ -56,6 +56,10 @@ class _Floats(_Derived):
         return math.sqrt(x) if x >= 0.0 else NAN
 
     @staticmethod
+    def reciprocal(x: float) -> float:
+        return 1.0 / x if x != 0.0 else math.copysign(math.inf, x)
+
+    @staticmethod
     def exp(x: float) -> float:
         return math.exp(x) if not x > 709.0 else math.inf
 
@@ -102,6 +106,10 @@ class _Arrays(_Derived):
     asin, atan2, tanh, nearest = np.arcsin, np.arctan2, np.tanh, np.rint
 
     @staticmethod
+    def reciprocal(x: Scalar) -> Scalar:
+        return 1.0 / x
+
+    @staticmethod
     def less(a: Scalar, b: Scalar) -> Scalar:
         return np.less(a, b).astype(float)
 
@@ -123,6 +131,7 @@ class _Heyoka(_Derived):
         self._atan2, self._cos, self._sin = module.atan2, module.cos, module.sin
         self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "cos", "tan", "asin", "tanh")}
         self._sqrt = module.sqrt
+        self._one = module.expression(1.0)
 
     def __getattr__(self, name: str) -> Any:
         # Plain one-argument functions need no adaptation: dispatch has seen that the argument is an expression.
@@ -135,6 +144,11 @@ class _Heyoka(_Derived):
         # There is no rounding: the distance from the nearest whole number is an angle.
         turn = x * (2.0 * math.pi)
         return x - self._atan2(self._sin(turn), self._cos(turn)) * (0.5 / math.pi)
+
+    def reciprocal(self, x: Scalar) -> Scalar:
+        # heyoka turns every product with a bare 1/x into a division of its own. A select of constant condition
+        # hides it from heyoka; LLVM then drops the select.
+        return self._select(self._one, 1.0 / x, x)
 
     def _lift(self, x: Scalar) -> Scalar:
         return x if isinstance(x, self._expression) else self._expression(float(x))
@@ -163,6 +177,10 @@ class _Casadi(_Derived):
         self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
         self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
 
+    @staticmethod
+    def reciprocal(x: Scalar) -> Scalar:
+        return 1.0 / x
+
     def nearest(self, x: Scalar) -> Scalar:
         return self._module.floor(x + 0.5)
 
@@ -175,6 +193,10 @@ class _Terms(_Derived):
         self.less, self.less_equal, self.select = module.less, module.less_equal, module.select
         self.minimum, self.maximum = module.minimum, module.maximum  # type: ignore[method-assign]
         self.absolute = module.absolute  # type: ignore[method-assign]
+
+    @staticmethod
+    def reciprocal(x: Scalar) -> Scalar:
+        return 1.0 / x
 
     def __getattr__(self, name: str) -> Any:
         return partial(self._function, "round" if name == "nearest" else name)
@@ -223,6 +245,11 @@ def _of(*arguments: Scalar) -> Any:
 def sqrt(x: Scalar) -> Scalar:
     """Square root; NaN below zero."""
     return _of(x).sqrt(x)
+
+
+def reciprocal(x: Scalar) -> Scalar:
+    """1/x, and infinity at zero, where a division of Python floats would raise."""
+    return _of(x).reciprocal(x)
 
 
 def exp(x: Scalar) -> Scalar:

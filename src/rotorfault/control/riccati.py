@@ -12,24 +12,20 @@ P = [[Y^T Z, Y^T], [Y, X]] > 0; others have residual zero too, so a small residu
 
 In flight every engine runs the same fixed sequence, `fly`: Newton-Kleinman steps from the stored gain, a test that
 the outcome stabilises, and a select of the guaranteed gain where it does not. Kleinman's step (IEEE TAC 13, 1968,
-p. 114) is an exact Lyapunov solve, here reduced to 3x3 algebra. The iterated reference solver is in
+p. 114) is an exact Lyapunov solve, here reduced to two 3x3 systems. The iterated reference solver is in
 `rotorfault.control.riccati_reference`.
+
+Every operation counts, for `fly` is a large part of a control step: products known to be symmetric are mirrored,
+and what depends on the weights alone (S, Qp, Qd and their quotients) is kept together, to be computed once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from rotorfault.geometry import Mat3, Vec3
 from rotorfault.records import select_record
-from rotorfault.scalar import NAN, Scalar, absolute, both, greater, is_finite, negated, select, sqrt
-
-_SKEW_BASIS = (
-    Mat3.skew(Vec3(1.0, 0.0, 0.0)),
-    Mat3.skew(Vec3(0.0, 1.0, 0.0)),
-    Mat3.skew(Vec3(0.0, 0.0, 1.0)),
-)
+from rotorfault.scalar import Scalar, absolute, both, greater, is_finite, negated, reciprocal, select, sqrt
 
 
 class AttitudeProblem(NamedTuple):
@@ -82,14 +78,14 @@ def attitude_problem(drift: Mat3, b: Vec3, q_angle: Vec3, q_rate: Vec3, r: Vec3)
         Weights of angles (> 0), rates (>= 0) and inputs (> 0), equation (35).
     """
     S = Vec3.of(b_i / sqrt(r_i) for b_i, r_i in zip(b, r, strict=True))
-    W = Mat3.diagonal(S.map(lambda s: 1.0 / s)) @ drift @ Mat3.diagonal(S)
+    W = drift.times(_ratios(S).T)
     return AttitudeProblem(W, Mat3.diagonal(q_angle.times(S.times(S))), Mat3.diagonal(q_rate.times(S.times(S))), S)
 
 
 def feedback(problem: AttitudeProblem, gain: Gain) -> tuple[Mat3, Mat3]:
     """Gain in physical units: the acceleration diag(b) u = -K_angle e - K_rate omega, in 1/s^2 and 1/s."""
-    S, S_inverse = Mat3.diagonal(problem.S), Mat3.diagonal(problem.S.map(lambda s: 1.0 / s))
-    return S @ gain.Y @ S_inverse, S @ gain.X @ S_inverse
+    ratios = _ratios(problem.S)  # S Y S^-1, element by element
+    return gain.Y.times(ratios), gain.X.times(ratios)
 
 
 def guaranteed_gain(problem: AttitudeProblem) -> Gain:
@@ -109,8 +105,18 @@ def chord_start(problem: AttitudeProblem) -> Gain:
     return Gain(Mat3.diagonal(y), Mat3.diagonal((problem.Qd.diag + 2.0 * y).map(sqrt)))
 
 
-def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> tuple[Gain, Scalar]:
+def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> Gain:
     """Improve a stabilising gain: solve the Lyapunov equation of its closed loop for the cost, take its gain.
+
+    The cost of [Y, K] has the lower half [N, X]. With Z = K - W its blocks read
+
+        Y^T N + N^T Y = Q_p + Y^T Y,  Z^T X + X Z = N + N^T + Q_d + K^T K,  N^T Z + Y^T (X - K) symmetric.
+
+    The first two leave one skew matrix each free. With vectors s and a for them,
+
+        2 N = Y + G,  2 X Z = B + G + skew(a),  G = Y^-T (Q_p + skew(s)),
+
+    with B = Y + Q_d + K^T K.
 
     Parameters
     ----------
@@ -121,31 +127,34 @@ def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> tuple[Gain, Sc
     Returns
     -------
     gain : Gain
-        [N, X], X symmetric. Where `gain` was stabilising, so is this one, and at most as costly.
-    stabilising : scalar, 1 or 0
-        1 where `gain` was stabilising, told from the cost matrix being positive definite; 0 for NaN.
-        Where it was not, the new gain is not either.
+        [N, X], X symmetric. Where `gain` was stabilising, so is this one, and at most as costly; where it was not,
+        this one is not either. Not finite where Y, Z or the Lyapunov equation is singular.
     """
     W, Qp, Qd, _ = problem
     Y, K = gain
     Z = K - W
-    M1, M2, M3 = Qp + Y.T @ Y, Y.T @ K, Qd + K.T @ K
-    solve = _LyapunovSolver(Z)
-    Y_inverse_T = _inverse(Y).T
+    Y_inverse = Y.inverse()
+    V, YZ = Y_inverse @ Z, Y @ Z
+    # Only the symmetric part of B counts; an upper triangular B would save 30 operations and cost a digit.
+    B = Y + Qd + _mirrored(K.T @ K)
 
-    # Y^T N + N^T Y = M1 fixes N up to a skew matrix, Y^-T skew(s), and X follows from N linearly.
-    N_0 = Y_inverse_T @ M1 * 0.5
-    X_0 = solve(N_0 + N_0.T + M3)
-    N_s = [Y_inverse_T @ skew for skew in _SKEW_BASIS]
-    X_s = [solve(N_k + N_k.T) for N_k in N_s]
+    # X and, multiplied by Z^T and Z, the third equation are symmetric when
+    #     L(V) s + L(Z) a = f,  L(Z) s + (L(YZ) + L(Z) adj(Z)) a = g,  L(M) = M - tr(M) I.
+    # Two rules lead there: axial(M^T skew(v)) = -L(M) v and axial(M^T C M) = adj(M) axial(C).
+    ZB = _axial(Z.T @ B)
+    adj_Z, t, d = Z.adjugate(), Z.trace(), Z.det()
+    f = ZB + _axial(V.T @ Qp)
+    g = _axial(YZ.T @ B) + _axial(Z.T @ Qp) + adj_Z @ (ZB - _axial(Y.T @ (K + W)))
+    L_V, L_Z = _less_trace(V), _less_trace(Z)
+    L_Z_inverse = (adj_Z + Z * t) * reciprocal(d - t * adj_Z.trace())
+    U = _less_trace(YZ) @ L_Z_inverse + adj_Z
+    s = _solve(L_Z - U @ L_V, g - U @ f)
+    a = L_Z_inverse @ (f - L_V @ s)
 
-    # s makes the upper left block of the cost matrix, N^T Z + Y^T X - M2, symmetric.
-    a, b, c = (_axial(N_k.T @ Z + Y.T @ X_k) for N_k, X_k in zip(N_s, X_s, strict=True))
-    s = -(_inverse(Mat3.columns(a, b, c)) @ _axial(N_0.T @ Z + Y.T @ X_0 - M2))
-    N, X = N_0, X_0
-    for s_k, N_k, X_k in zip(s, N_s, X_s, strict=True):
-        N, X = N + N_k * s_k, X + X_k * s_k
-    return Gain(N, X), _positive_definite(N.T @ Z + Y.T @ X - M2, N, X)
+    G = Y_inverse.T @ (Qp + Mat3.skew(s))
+    N = (Y + G) * 0.5
+    X = _mirrored((B + G + Mat3.skew(a)) @ adj_Z) * (0.5 * reciprocal(d))
+    return Gain(N, X)
 
 
 def chord_step(problem: AttitudeProblem, gain: Gain) -> Gain:
@@ -185,27 +194,29 @@ def chord_step(problem: AttitudeProblem, gain: Gain) -> Gain:
 
 
 def routh_stable(problem: AttitudeProblem, gain: Gain) -> Scalar:
-    """1 where the gain stabilises, by Routh's test on det(lambda^2 I + lambda Z + Y); X need not be symmetric."""
+    """1 where the gain stabilises, by Routh's test on det(lambda^2 I + lambda Z + Y); 0 for NaN and infinity.
+
+    X need not be symmetric. Each row of Routh's table is multiplied by the head of the row above, which does not
+    change signs as long as they are positive and saves the divisions. The last head is of 19th degree in the poles:
+    it overflows, and counts as unstable, beyond 1e15 rad/s.
+
+    A step from a start on the verge of stability has a gain so large that the coefficients are small differences of
+    large numbers. It shows in det(Y) or det(Z), which then is tiny against the product of its columns' lengths
+    (Hadamard's bound); below 1e-10 of that the signs are not trusted.
+    """
     Y, Z = gain.Y, gain.X - problem.W
     adj_Y, adj_Z = Y.adjugate(), Z.adjugate()
-    t_Y, t_Z = Y.trace(), Z.trace()
-    coefficients = (
-        1.0,
-        t_Z,
-        adj_Z.trace() + t_Y,
-        Z.det() + t_Z * t_Y - (Z @ Y).trace(),
-        adj_Y.trace() + (adj_Z @ Y).trace(),
-        (adj_Y @ Z).trace(),
-        Y.det(),
-    )
-    above, row = list(coefficients[0::2]), list(coefficients[1::2])
-    stable = greater(row[0], 0.0)
-    while len(above) > 1:
-        ratio = above[0] * _reciprocal(row[0])
-        below = [a - ratio * b for a, b in zip(above[1:], [*row[1:], 0.0], strict=False)]
+    t_Y, t_Z, d_Y, d_Z = Y.trace(), Z.trace(), Y.det(), Z.det()
+    above = [1.0, adj_Z.trace() + t_Y, adj_Y.trace() + _trace_of_product(adj_Z, Y), d_Y]
+    row = [t_Z, d_Z + t_Z * t_Y - _trace_of_product(Z, Y), _trace_of_product(adj_Y, Z)]
+    certain = both(_certain_determinant(Y, d_Y), _certain_determinant(Z, d_Z))
+    stable = both(certain, both(greater(d_Y, 0.0), greater(t_Z, 0.0)))
+    for _ in range(4):
+        below = [row[0] * a - above[0] * b for a, b in zip(above[1:], [*row[1:], 0.0], strict=False)]
         above, row = row, below
         stable = both(stable, greater(row[0], 0.0))
-    return stable
+    # The last head is made of all coefficients: where one of them is not finite, it is not either.
+    return both(stable, is_finite(row[0]))
 
 
 def residual(problem: AttitudeProblem, gain: Gain) -> Scalar:
@@ -214,15 +225,8 @@ def residual(problem: AttitudeProblem, gain: Gain) -> Scalar:
     Zero for *every* solution of (22), also for those that do not stabilise. The asymmetry shows up a gain that is
     no part of any cost matrix, such as `guaranteed_gain`.
     """
-    Y, X = gain
-    YZ = Y.T @ (X - problem.W)
-    diagonal = YZ.diag.map(absolute)
-    return (
-        (problem.Qp - Y.T @ Y).norm() / problem.Qp.trace()
-        + _rate_defect(problem, gain).norm() / X.diag.dot(X.diag)
-        + (YZ - YZ.T).norm() / (diagonal.x + diagonal.y + diagonal.z)
-        + (X - X.T).norm() / X.norm()
-    )
+    X = gain.X
+    return _residual_of_blocks(problem, gain) + (X - X.T).norm() / X.norm()
 
 
 def fly(problem: AttitudeProblem, stored: Gain, steps: int) -> tuple[Gain, Scalar, Scalar]:
@@ -242,45 +246,46 @@ def fly(problem: AttitudeProblem, stored: Gain, steps: int) -> tuple[Gain, Scala
     gain : Gain
         Stabilises for the frozen W, always (if W is finite).
     residual : scalar
-        `residual` of this gain.
+        `residual` of this gain; 1 where the guaranteed gain is returned, which solves no Riccati equation.
     guarded : scalar, 1 or 0
         1 where the steps failed and the guaranteed gain is returned.
     """
     if steps < 1:
-        raise ValueError(f"steps is {steps}; at least one Newton-Kleinman step is needed, as only it brings a test")
-    gain, improved = newton_kleinman_step(problem, stored)
-    for _ in range(steps - 1):
-        gain, improved = newton_kleinman_step(problem, gain)  # from a stabilising gain, all later ones stabilise
-    # But for rounding the two tests are one: a step's gain stabilises exactly where its cost matrix is positive
-    # definite. About 1 of 100,000 wild starts is ill-conditioned enough to pass the cost matrix by mistake.
-    stabilising = both(improved, routh_stable(problem, gain))
-    gain = select_record(stabilising, gain, guaranteed_gain(problem))
-    return gain, residual(problem, gain), negated(stabilising)
+        raise ValueError(f"steps is {steps}; at least one Newton-Kleinman step is needed")
+    gain = stored
+    for _ in range(steps):
+        gain = newton_kleinman_step(problem, gain)
+    stabilising = routh_stable(problem, gain)
+    flown = select_record(stabilising, gain, guaranteed_gain(problem))
+    # X of a step is symmetric to the last bit, so that its asymmetry need not be measured.
+    return flown, select(stabilising, _residual_of_blocks(problem, gain), 1.0), negated(stabilising)
 
 
 # ------------------------------------------------------------------------------------------------------------ algebra
 
 
-class _LyapunovSolver:
-    """Z^T X + X Z = C for a 3x3 Z and several symmetric C, in closed form by Cayley and Hamilton."""
-
-    def __init__(self, Z: Mat3) -> None:
-        self._Z, self._Z2 = Z, Z @ Z
-        self._t, self._u = Z.trace(), Z.adjugate().trace()
-        self._divisor = _inverse((self._Z2.T * self._t + Mat3.diagonal(Vec3(1.0, 1.0, 1.0) * Z.det())) * 2.0)
-
-    def __call__(self, C: Mat3) -> Mat3:
-        Z, Z2, t, u = self._Z, self._Z2, self._t, self._u
-        CZ = C @ Z
-        X: Mat3 = self._divisor @ (C @ Z2 - Z.T @ CZ + Z2.T @ C - (CZ - CZ.T) * t + C * u)
-        return Mat3.__mul__(X + X.T, 0.5)  # symmetric already but for rounding
+def _ratios(S: Vec3) -> Mat3:
+    """The quotients s_i/s_j, for which S M S^-1 is an elementwise product."""
+    return Mat3(1.0, S.x / S.y, S.x / S.z, S.y / S.x, 1.0, S.y / S.z, S.z / S.x, S.z / S.y, 1.0)
 
 
 def _rate_defect(problem: AttitudeProblem, gain: Gain) -> Mat3:
     """Defect of the rate block, Q_d + W^T W + Y + Y^T - Z^T Z, in the form that does not cancel W^T W."""
     Y, X = gain
-    XW = X.T @ problem.W
-    return problem.Qd + Y + Y.T - X.T @ X + XW + XW.T
+    W = problem.W
+    return problem.Qd + _mirrored(Y + Y.T - (X.T @ (X - W) - W.T @ X))
+
+
+def _residual_of_blocks(problem: AttitudeProblem, gain: Gain) -> Scalar:
+    """`residual` without the asymmetry of X."""
+    Y, X = gain
+    YZ = Y.T @ (X - problem.W)
+    skew, diagonal = _axial(YZ), YZ.diag.map(absolute)
+    return (
+        _norm_of_symmetric(problem.Qp - _mirrored(Y.T @ Y)) * (1.0 / problem.Qp.trace())
+        + _norm_of_symmetric(_rate_defect(problem, gain)) / X.diag.dot(X.diag)
+        + sqrt(2.0 * skew.dot(skew)) / (diagonal.x + diagonal.y + diagonal.z)
+    )
 
 
 def _axial(M: Mat3) -> Vec3:
@@ -288,27 +293,37 @@ def _axial(M: Mat3) -> Vec3:
     return Vec3(M.zy - M.yz, M.xz - M.zx, M.yx - M.xy)
 
 
-def _reciprocal(x: Scalar) -> Scalar:
-    """1/x, and NaN at zero, where Python floats would raise."""
-    return 1.0 / select(greater(x * x, 0.0), x, NAN)
+def _mirrored(M: Mat3) -> Mat3:
+    """The symmetric matrix with this upper triangle, for a product that is symmetric but for rounding.
+
+    A compiled function leaves out what only the elements below the diagonal would need.
+    """
+    return Mat3(M.xx, M.xy, M.xz, M.xy, M.yy, M.yz, M.xz, M.yz, M.zz)
 
 
-def _inverse(M: Mat3) -> Mat3:
-    """Inverse; NaN where the matrix is singular."""
-    inverse: Mat3 = M.adjugate() * _reciprocal(M.det())
-    return inverse
+def _less_trace(M: Mat3) -> Mat3:
+    """M - tr(M) I."""
+    return Mat3(-M.yy - M.zz, M.xy, M.xz, M.yx, -M.xx - M.zz, M.yz, M.zx, M.zy, -M.xx - M.yy)
 
 
-def _positive_definite(P11: Mat3, P21: Mat3, P22: Mat3) -> Scalar:
-    """1 where the symmetric 6x6 matrix [[P11, P21^T], [P21, P22]] is positive definite and finite, else 0."""
-    left, right = [*P11.rows, *P21.rows], [*P21.T.rows, *P22.rows]
-    rows: Sequence[Sequence[Scalar]] = [[*a, *b][: i + 1] for i, (a, b) in enumerate(zip(left, right, strict=True))]
-    positive = is_finite(P11.trace() + P22.trace())  # the diagonal of a positive definite matrix bounds the rest
-    while rows:
-        # One step of Cholesky's elimination on the lower triangle; a pivot of zero or below fails at once.
-        pivot, column = rows[0][0], [row[0] for row in rows[1:]]
-        positive = both(positive, greater(pivot, 0.0))
-        reciprocal = _reciprocal(pivot)
-        scaled = [c * reciprocal for c in column]
-        rows = [[a - scaled[i] * column[j] for j, a in enumerate(row[1:])] for i, row in enumerate(rows[1:])]
-    return positive
+def _solve(M: Mat3, v: Vec3) -> Vec3:
+    """The vector u with M u = v; not finite where M is singular."""
+    u: Vec3 = (M.adjugate() @ v) * reciprocal(M.det())
+    return u
+
+
+def _trace_of_product(A: Mat3, B: Mat3) -> Scalar:
+    """tr(A B)."""
+    return (A @ B).trace()
+
+
+def _certain_determinant(M: Mat3, det: Scalar) -> Scalar:
+    """1 where the determinant is above 1e-10 of Hadamard's bound, so that rounding leaves its sign alone."""
+    squares = (M.T @ M).diag
+    return greater(det * det, 1e-20 * squares.x * squares.y * squares.z)
+
+
+def _norm_of_symmetric(M: Mat3) -> Scalar:
+    """Frobenius norm, from the upper triangle."""
+    diagonal, upper = M.diag, Vec3(M.xy, M.xz, M.yz)
+    return sqrt(diagonal.dot(diagonal) + 2.0 * upper.dot(upper))

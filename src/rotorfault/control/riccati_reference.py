@@ -51,7 +51,7 @@ def solve_iterated(problem: AttitudeProblem) -> Gain:
     best, least = guaranteed_gain(problem), math.inf
     gain = best
     for _ in range(MOST_STEPS):
-        gain, _ = newton_kleinman_step(problem, gain)
+        gain = newton_kleinman_step(problem, gain)
         now = residual(problem, gain)
         if not now < least and least < _NEAR:
             break

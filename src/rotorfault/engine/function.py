@@ -66,11 +66,18 @@ class CompiledFunction:
         arguments = grouped(rows, self._lanes)
         return ungrouped(self.evaluate(arguments), rows.shape[1])
 
-    def evaluate(self, groups: Array) -> Array:
-        """Evaluate arguments in the machine's layout, shape (groups, leaves, lanes); nothing is rearranged."""
-        out = aligned((len(groups), self._rows, self._lanes))
+    def evaluate(self, groups: Array, out: Array | None = None) -> Array:
+        """Evaluate arguments in the machine's layout (see `grouped`), shape (groups, leaves, lanes).
+
+        Nothing is rearranged, and nothing allocated where `out` is given.
+        """
+        out = aligned((len(groups), self._rows, self._lanes)) if out is None else out
         self._native("evaluate", groups, out, len(groups))
         return out
+
+    def bound(self, groups: Array, out: Array) -> Callable[[], None]:
+        """`evaluate` with its arguments, to be called again and again; both arrays must outlive it."""
+        return self._native.bound("evaluate", groups, out, len(groups))
 
 
 _MODULE = """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -66,6 +66,11 @@ class Native:
         for name, arrays, numbers in functions:
             kind = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arrays, *[ctypes.c_int64] * numbers)
             self._functions[name] = kind(self._library[name])
+
+    def bound(self, name: str, *arguments: Array | int) -> Callable[[], None]:
+        """A function with its arguments, to be called again and again; the arrays must outlive it."""
+        pointers = [a.ctypes.data if isinstance(a, np.ndarray) else a for a in arguments]
+        return partial(self._functions[name], *pointers)
 
     def __call__(self, name: str, *arguments: Array | int) -> None:
         """Call a function; arrays must be contiguous."""
