@@ -23,7 +23,8 @@ from rotorfault.assembly import assemble
 from rotorfault.catalogue import REGISTRIES
 from rotorfault.closed_loop import Drive
 from rotorfault.engine import have_simd, load_engine
-from rotorfault.engine.batch import GUSTS, Batch, Noise, drive_template, no_watch
+from rotorfault.engine.batch import Batch, drive_template, no_watch
+from rotorfault.engine.noise import GUSTS, Noise
 from rotorfault.engine.structure import structure
 from rotorfault.geometry import Vec3, zeros
 from rotorfault.plant import no_noise

@@ -18,7 +18,8 @@ from rotorfault.assembly import assemble, assemble_all
 from rotorfault.control.cascade import Cascade, CascadeSettings, limited_force
 from rotorfault.control.sdre import Sdre, Weights
 from rotorfault.engine import ENGINES, cache, default_engine, have_simd, load_engine
-from rotorfault.engine.batch import CHUNK, Batch, Noise, Recording, no_watch
+from rotorfault.engine.batch import CHUNK, Batch, Recording, no_watch
+from rotorfault.engine.noise import Noise
 from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3

@@ -9,7 +9,8 @@ import numpy as np
 
 from rotorfault.autopilot import Autopilot
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, Start
-from rotorfault.engine.batch import FIRST_GUST, SENSOR_NOISE, Array, Batch, Noise, Stream, columns, no_reference
+from rotorfault.engine.batch import Array, Batch, columns, no_reference
+from rotorfault.engine.noise import FIRST_GUST, SENSOR_NOISE, Noise, Stream
 from rotorfault.engine.structure import structure
 from rotorfault.errors import InputError
 from rotorfault.geometry import Vec3

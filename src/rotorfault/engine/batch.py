@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.engine.noise import GUSTS, SENSOR_NOISE, Noise, Stream
 from rotorfault.geometry import zeros
 from rotorfault.plant.sensors import no_noise
 from rotorfault.records import flatten, leaf_names
@@ -63,52 +64,10 @@ def no_watch(done: int) -> bool:
     return False
 
 
-class Stream(NamedTuple):
-    """One of the streams of normal numbers of a flight."""
-
-    width: int  # numbers a step
-    words: tuple[int, ...]  # tell it from the others of the same flight
-
-
-SENSOR_NOISE = Stream(12, ())  # `Normals`
-GUSTS = Stream(3, (1,))  # `Drive.gust`
-FIRST_GUST = Stream(6, (2,))  # `FirstNormals`, one step of them
-
-
-class Noise:
-    """Standard normal numbers of each flight, the same whatever batch it flies in.
-
-    A counter-based generator (Philox) per flight and stream, keyed by (seed, flight index) and the words of the
-    stream; numbers are drawn in order of steps. Streams of their own keep the gusts of a flight when its sensors get
-    noise, and the other way round.
-    """
-
-    def __init__(self, seeds: tuple[tuple[int, int], ...], stream: Stream = SENSOR_NOISE) -> None:
-        self.width = stream.width
-        # The index as a key of its own: as further entropy, large seeds would run into other seeds' indices.
-        sequences = [np.random.SeedSequence(seed, spawn_key=(i, *stream.words)) for seed, i in seeds]
-        self._generators = [np.random.Generator(np.random.Philox(s)) for s in sequences]
-
-    def each(self, steps: int) -> Iterator[Array]:
-        """Numbers of the next steps, flight by flight, shape (steps, numbers of the stream)."""
-        return (g.standard_normal((steps, self.width)) for g in self._generators)
-
-    def draw(self, steps: int) -> Array:
-        """Numbers of the next steps, shape (steps, numbers of the stream, N)."""
-        return np.stack(list(self.each(steps)), axis=2)
-
-    def only(self, flights: Iterable[int]) -> Noise:
-        """The generators of some of the flights, where they are."""
-        some = Noise(())
-        some.width, some._generators = self.width, [self._generators[i] for i in flights]
-        return some
-
-
-def noise_of(batch: Batch, part: slice = slice(None)) -> list[Noise]:
-    """The generators of all streams that a batch draws from, in the order of their rows; of some of its flights."""
-    loop, seeds = batch.loop, batch.seeds[part]
-    sensors = [Noise(seeds, SENSOR_NOISE)] if loop.sensors.needs_noise else []
-    return sensors + ([Noise(seeds, GUSTS)] if loop.plant.wind.needs_noise else [])
+def streams_of(batch: Batch) -> list[Stream]:
+    """The streams that a batch draws from at every step, in the order of their rows."""
+    loop = batch.loop
+    return [SENSOR_NOISE] * loop.sensors.needs_noise + [GUSTS] * loop.plant.wind.needs_noise
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
@@ -117,7 +76,7 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
     The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, rows, N) with it: twelve
     rows more for sensors that need noise, and then three more for a wind that does.
     """
-    noise = noise_of(batch)
+    noise = [Noise(batch.seeds, stream) for stream in streams_of(batch)]
     for first in range(0, batch.steps, CHUNK):
         reference = batch.reference[first : first + CHUNK, :, None]
         if not noise:

@@ -109,8 +109,13 @@ class Code:
         return taken if a.startswith("splat") else self.select(self.compare("uno", a, a), a, taken)
 
     def integer_op(self, name: str, a: str, b: str) -> str:
-        """add, sub, and, xor, shl, ashr."""
+        """add, sub, and, or, xor, shl, lshr, ashr."""
         return self.value(f"{name} {self.integers} {a}, {b}", "logic")
+
+    def rotated(self, a: str, left: int) -> str:
+        """Whole numbers with their bits turned to the left."""
+        n, v = self.lanes, self.integers
+        return self.value(f"call {v} @llvm.fshl.v{n}i64({v} {a}, {v} {a}, {v} {self.integer(left)})", "logic")
 
     def bits(self, a: str) -> str:
         """The bits of numbers as whole numbers."""
@@ -153,3 +158,5 @@ def declarations(lanes: int) -> Iterable[str]:
     v = f"<{lanes} x double>"
     for name, count in (("fma", 3), ("sqrt", 1), ("fabs", 1), ("copysign", 2), ("rint", 1)):
         yield f"declare {v} @llvm.{name}.v{lanes}f64({', '.join([v] * count)})"
+    whole = f"<{lanes} x i64>"
+    yield f"declare {whole} @llvm.fshl.v{lanes}i64({whole}, {whole}, {whole})"

@@ -38,6 +38,11 @@ _EXP = (
     2.4801587325547743e-05, 0.00019841269874820627, 0.0013888888888883748, 0.008333333333326136,
     0.04166666666666667, 0.1666666666666667, 0.5,
 )  # fmt: skip
+# (2 artanh(s)/s - 2)/s^2 in s^2, on |s| <= (sqrt 2 - 1)/(sqrt 2 + 1).
+_LOG = (
+    0.14616585424888623, 0.15331710618210773, 0.18182889455674947, 0.22222211130259878, 0.2857142862600327,
+    0.39999999999899444, 0.666666666666667,
+)  # fmt: skip
 # (atan t / t - 1)/t^2 in t^2, on |t| <= tan(pi/8).
 _ATAN = (
     0.016285756855221028, -0.034570561981427744, 0.04551593220626549, -0.05230454270650244, 0.05878928997834775,
@@ -81,18 +86,54 @@ def _sine_or_cosine(code: Code, x: str, quarter_turns: int) -> str:
     r = x
     for part in _HALF_PI:
         r = code.fma(minus_n, code.constant(part), r)
-    z = code.op("fmul", r, r)
-    sin_r = code.fma(code.op("fmul", z, r), _polynomial(code, z, _SIN), r)
-    cos_r = code.fma(
-        code.op("fmul", z, z), _polynomial(code, z, _COS), code.fma(z, code.constant(-0.5), code.constant(1.0))
-    )
-    quadrant = code.integer_op("add", code.bits(shifted), code.integer(quarter_turns))
-    odd = code.bit_set(quadrant, 1)
-    value = code.select(odd, cos_r, sin_r)
-    flip = code.integer_op("shl", code.integer_op("and", quadrant, code.integer(2)), code.integer(62))
-    signed = code.number(code.integer_op("xor", code.bits(value), flip))
+    sin_r, cos_r = _kernels(code, r)
+    signed = _in_quadrant(code, shifted, quarter_turns, sin_r, cos_r)
     plain = code.compare("ole", code.magnitude(x), code.constant(LARGEST_ANGLE))
     return code.select(plain, signed, code.constant(math.nan))
+
+
+def _kernels(code: Code, r: str) -> tuple[str, str]:
+    """Sine and cosine on [-pi/4, pi/4]."""
+    z = code.op("fmul", r, r)
+    sine = code.fma(code.op("fmul", z, r), _polynomial(code, z, _SIN), r)
+    straight = code.fma(z, code.constant(-0.5), code.constant(1.0))
+    return sine, code.fma(code.op("fmul", z, z), _polynomial(code, z, _COS), straight)
+
+
+def _in_quadrant(code: Code, shifted: str, quarter_turns: int, sin_r: str, cos_r: str) -> str:
+    """The sine after so many quarter turns more than the lowest bits of `shifted` say."""
+    quadrant = code.integer_op("add", code.bits(shifted), code.integer(quarter_turns))
+    value = code.select(code.bit_set(quadrant, 1), cos_r, sin_r)
+    flip = code.integer_op("shl", code.integer_op("and", quadrant, code.integer(2)), code.integer(62))
+    return code.number(code.integer_op("xor", code.bits(value), flip))
+
+
+def sine_and_cosine_of_turn(code: Code, turns: str) -> tuple[str, str]:
+    """Sine and cosine of an angle in turns, 0 to 1 and a multiple of 2^-32, so that its quarters part exactly."""
+    quarters = code.op("fmul", turns, code.constant(4.0))
+    shifted = code.op("fadd", quarters, code.constant(_TO_INTEGER))
+    rest = code.op("fsub", quarters, code.op("fsub", shifted, code.constant(_TO_INTEGER)))
+    sin_r, cos_r = _kernels(code, code.op("fmul", rest, code.constant(_HALF_PI[0])))
+    sine, cosine = (_in_quadrant(code, shifted, shift, sin_r, cos_r) for shift in (0, 1))
+    return sine, cosine
+
+
+def logarithm(code: Code, x: str) -> str:
+    """Natural logarithm of an ordinary positive number: m 2^e with m around 1, ln m = 2 artanh((m - 1)/(m + 1))."""
+    bits = code.bits(x)
+    fraction = code.integer_op("and", bits, code.integer((1 << 52) - 1))
+    m = code.number(code.integer_op("or", fraction, code.integer(0x3FF << 52)))
+    large = code.compare("ogt", m, code.constant(math.sqrt(2.0)))
+    m = code.select(large, code.op("fmul", m, code.constant(0.5)), m)
+    exponent = code.integer_op("lshr", bits, code.integer(52))
+    biased = code.number(code.integer_op("or", exponent, code.integer(0x4330 << 48)))  # 2^52 + e + 1023
+    e = code.op("fsub", biased, code.constant(2.0**52 + 1023.0))
+    e = code.select(large, code.op("fadd", e, code.constant(1.0)), e)
+    one = code.constant(1.0)
+    s = code.op("fdiv", code.op("fsub", m, one), code.op("fadd", m, one))
+    z = code.op("fmul", s, s)
+    tail = code.fma(code.op("fmul", s, z), _polynomial(code, z, _LOG), code.op("fmul", e, code.constant(_LN2[1])))
+    return code.fma(e, code.constant(_LN2[0]), code.fma(s, code.constant(2.0), tail))
 
 
 def exponential(code: Code, x: str) -> str:

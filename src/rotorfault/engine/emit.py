@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rotorfault.engine import elementary
 from rotorfault.engine.code import Code
+from rotorfault.engine.noise import Stream
+from rotorfault.engine.random_code import normal
 from rotorfault.engine.trace import Term
 
 _FUNCTIONS: dict[str, Callable[..., str]] = {
@@ -142,7 +144,7 @@ class Emitter:
             fused = next((a for a in term.args if a.index in self._merging.products), None)
             if fused is not None:
                 return [*fused.args, *(a for a in term.args if a is not fused)]
-        return list(term.args)
+        return [a for a in term.args if isinstance(a, Term)]
 
     def _there(self, term: Term) -> bool:
         return term.op == "const" or term.index in self._numbers or term.index in self._masks
@@ -168,10 +170,14 @@ class Emitter:
         else:
             self._numbers[term.index] = self._arithmetic(op, args)
 
-    def _arithmetic(self, op: str, args: tuple[Term, ...]) -> str:
+    def _arithmetic(self, op: str, args: tuple[Any, ...]) -> str:
         code = self.code
         if op in ("add", "sub"):
             return self._sum(op, *args)
+        if op == "normal":
+            seed, index, step = (self._number(a) for a in args[:3])
+            width, word, number = args[3:]
+            return normal(code, seed, index, step, Stream(width, word), number)
         numbers = [self._number(a) for a in args]
         if op == "mul":
             return code.op("fmul", *numbers)

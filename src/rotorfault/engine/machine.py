@@ -12,7 +12,7 @@ from rotorfault.engine.cache import Compiled
 from rotorfault.engine.program import program, trace
 from rotorfault.progress import Busy
 
-_FUNCTIONS = (("prepare", 2, 1), ("fly", 5, 2))
+_FUNCTIONS = (("prepare", 2, 1), ("fly", 4, 2))
 _NOTHING = np.zeros(1)
 _LOADED: dict[str, Machine] = {}
 
@@ -31,7 +31,7 @@ class Machine:
 
         Parameters
         ----------
-        parameters : ndarray, shape (groups, rows of the parameters, lanes)
+        parameters : ndarray, shape (groups, rows of the parameters and `program.SEED`, lanes)
 
         Returns
         -------
@@ -41,7 +41,7 @@ class Machine:
         self._native("prepare", parameters, prepared, len(parameters))
         return prepared
 
-    def fly(self, state: Array, prepared: Array, shared: Array, own: Array | None, signals: Array | None) -> None:
+    def fly(self, state: Array, prepared: Array, shared: Array, signals: Array | None) -> None:
         """Take the state as many steps further as there are rows of the shared inputs, in place.
 
         Parameters
@@ -50,12 +50,11 @@ class Machine:
         prepared : ndarray
             From `prepare`.
         shared : ndarray, shape (steps, shared rows)
-        own : ndarray, shape (groups, steps, own rows, lanes), or None
         signals : ndarray, shape (groups, steps, rows of the signals, lanes), or None
             Written here, where the program has signals.
         """
-        own, out = (_NOTHING if part is None else part for part in (own, signals))
-        self._native("fly", state, prepared, shared, own, out, len(state), len(shared))
+        out = _NOTHING if signals is None else signals
+        self._native("fly", state, prepared, shared, out, len(state), len(shared))
 
 
 class Machines(NamedTuple):
@@ -82,13 +81,6 @@ def aligned(shape: tuple[int, ...]) -> Array:
     raw = np.zeros(count + 8)
     skipped = (-raw.ctypes.data // 8) % 8
     return raw[skipped : skipped + count].reshape(shape)
-
-
-def aligned_copy(values: Array) -> Array:
-    """The same numbers, as `aligned`."""
-    out = aligned(values.shape)
-    out[:] = values
-    return out
 
 
 def grouped(rows: Array, lanes: int) -> Array:

@@ -3,9 +3,10 @@
 Memory is laid out by groups of as many flights as a vector has lanes; within a group each row is one vector:
 
     state[group][row][lane]          parameters[group][row][lane]
-    own[group][step][row][lane]      inputs of single flights: random numbers
     out[group][step][row][lane]      signals, where they are wanted
     shared[step][row]                inputs that all flights share: the reference
+
+The parameters end with seed and index of the flight, from which its random numbers are computed where they are used.
 
 One call takes some groups some steps further, each group through all the steps before the next, so that its state and
 parameters stay in the cache next to the processor.
@@ -22,7 +23,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from rotorfault.closed_loop import LoopState
-from rotorfault.engine.batch import Batch, as_drive, drive_template
+from rotorfault.engine.batch import Batch, as_drive, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
@@ -30,6 +31,7 @@ from rotorfault.geometry import PerRotor, zeros
 from rotorfault.records import flatten, leaf_names, unflatten
 from rotorfault.signals import Command
 
+SEED = ("seed", "index")  # rows after the parameters
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
 
 
@@ -41,7 +43,6 @@ class Layout(NamedTuple):
     state: int
     over: int  # row of the state that is not 0 once the flight is over
     shared: int
-    own: int
     signals: int
 
 
@@ -72,20 +73,25 @@ class Program(NamedTuple):
 def trace(batch: Batch) -> Traced:
     """Run the closed loop of a batch once, on terms."""
     loop, template = batch.loop, drive_template(batch)
-    rows, shared = len(flatten(template)), len(flatten(template.reference))
+    shared = len(flatten(template.reference))
     names = leaf_names(batch.state)
     layout = Layout(
-        parameters=len(flatten(batch.parameters)),
+        parameters=len(flatten(batch.parameters)) + len(SEED),
         prepared=0,
         state=len(names),
         over=names.index("scores.over"),
         shared=shared,
-        own=rows - shared,
         signals=0,
     )
     tape = Tape()
-    drive = as_drive(unflatten(template, [*tape.leaves("shared", shared), *tape.leaves("own", layout.own)]))
     state, parameters = _symbols(tape, "state", batch.state), _symbols(tape, "par", batch.parameters)
+    seed, index = (tape.term("par", layout.parameters - len(SEED) + i) for i in range(len(SEED)))
+    normals = [
+        tape.term("normal", seed, index, state.steps, *stream, number)
+        for stream in streams_of(batch)
+        for number in range(stream.width)
+    ]
+    drive = as_drive(unflatten(template, [*tape.leaves("shared", shared), *normals]))
     if loop.plant.substeps <= MOST_IN_ONE:
         after, signals = loop.step(state, drive, parameters)
         writes = [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(after))]
@@ -125,7 +131,7 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
         Whether every step writes its signals.
     """
     leaves = {
-        "par": Leaf("%par"), "state": Leaf("%state"), "kept": Leaf("%kept"), "own": Leaf("%own"),
+        "par": Leaf("%par"), "state": Leaf("%state"), "kept": Leaf("%kept"),
         "shared": Leaf("%shared", one_for_all=True), "count": Leaf("%count", in_register=True),
     }  # fmt: skip
     before, pieces, prepared = Code(lanes, "p"), [], 0
@@ -157,7 +163,6 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
         raw=layout.parameters * lanes,
         prepared=prepared * lanes,
         state=layout.state * lanes,
-        own=layout.own * lanes,
         out=layout.signals * lanes if with_signals else 0,
         shared=layout.shared,
         kept=kept * lanes,
@@ -227,7 +232,7 @@ done:
 }}
 
 define void @fly(ptr noalias %state0, ptr noalias readonly %par0, ptr noalias readonly %shared0,
-                 ptr noalias readonly %own0, ptr noalias %out0, i64 %groups, i64 %steps) {{
+                 ptr noalias %out0, i64 %groups, i64 %steps) {{
 entry:
   %kept = alloca [{kept} x double], align 64
   br label %each
@@ -242,8 +247,6 @@ each:
 step:
   %k = phi i64 [ 0, %each ], [ %k1, %{latch} ]
   %here = add i64 %before, %k
-  %own_at = mul i64 %here, {own}
-  %own = getelementptr inbounds double, ptr %own0, i64 %own_at
   %out_at = mul i64 %here, {out}
   %out = getelementptr inbounds double, ptr %out0, i64 %out_at
   %shared_at = mul i64 %k, {shared}

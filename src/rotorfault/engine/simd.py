@@ -1,9 +1,9 @@
 """Engine on machine code: the closed loop traced once, compiled by LLVM, run over vector lanes and threads.
 
 Flights are flown in blocks small enough for the cache, each block by one thread from its first step to its last, in
-chunks of steps. Between two chunks random numbers are drawn, and flights that are over make room: the others move
-together, and groups of lanes that have become empty are flown no further. What a flight's numbers are depends on none
-of that: each lane computes for itself, with the same operations in the same order.
+chunks of steps. Between two chunks flights that are over make room: the others move together, and groups of lanes
+that have become empty are flown no further. What a flight's numbers are depends on none of that: each lane computes
+for itself, with the same operations in the same order.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, no_watch, noise_of
-from rotorfault.engine.machine import Machine, Machines, aligned, aligned_copy, grouped, ungrouped
+from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, no_watch
+from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
 PATIENCE = 0.1  # s between two looks at progress
@@ -132,60 +132,45 @@ class _Block:
         common, batch = self._common, self._common.batch
         part = slice(int(self._flights[0]), int(self._flights[-1]) + 1)
         self._state = grouped(columns(batch.state, batch.flights, part), common.lanes)
-        parameters = grouped(columns(batch.parameters, batch.flights, part), common.lanes)
+        seeds = np.array(batch.seeds[part], dtype=float).T
+        parameters = grouped(np.vstack([columns(batch.parameters, batch.flights, part), seeds]), common.lanes)
         self._prepared = {
             id(machine): machine.prepare(parameters)
             for machine in (common.quiet, common.recording)
             if machine is not None
         }
-        self._noise = noise_of(batch, part)
 
     def _advance(self, first: int, steps: int) -> None:
         """Fly some steps, and record those that are wanted."""
         common, every = self._common, self._common.batch.every
         shared = common.reference[first : first + steps]
-        own = self._own(steps)
         if common.recording is None:
             assert common.quiet is not None
-            self._call(common.quiet, shared, own)
+            self._call(common.quiet, shared)
             return
         if common.quiet is None:
-            self._record(first, shared, own)
+            self._record(first, shared)
             return
         k = 0
         while k < steps:
             wanted = (first + k) % every == 0
             until = k + 1 if wanted else min(steps, k + every - (first + k) % every)
-            piece = None if own is None else aligned_copy(own[:, k:until])
             if wanted:
-                self._record(first + k, shared[k:until], piece)
+                self._record(first + k, shared[k:until])
             else:
-                self._call(common.quiet, shared[k:until], piece)
+                self._call(common.quiet, shared[k:until])
             k = until
 
-    def _record(self, first: int, shared: Array, own: Array | None) -> None:
+    def _record(self, first: int, shared: Array) -> None:
         machine = self._common.recording
         assert machine is not None
         out = aligned((len(self._state), len(shared), machine.layout.signals, machine.lanes))
-        self._call(machine, shared, own, out)
+        self._call(machine, shared, out)
         by_flight = out.transpose(1, 2, 0, 3).reshape(len(shared), machine.layout.signals, -1)
         self._common.records.add(first, by_flight[:, :, : len(self._flights)], self._flights)
 
-    def _call(self, machine: Machine, shared: Array, own: Array | None, out: Array | None = None) -> None:
-        machine.fly(self._state, self._prepared[id(machine)], shared, own, out)
-
-    def _own(self, steps: int) -> Array | None:
-        """Random numbers of the next steps, shape (groups, steps, rows, lanes)."""
-        if not self._noise:
-            return None
-        lanes = self._common.lanes
-        own = aligned((len(self._state), steps, self._common.layout.own, lanes))
-        row = 0
-        for stream in self._noise:
-            for i, numbers in enumerate(stream.each(steps)):
-                own[i // lanes, :, row : row + stream.width, i % lanes] = numbers
-            row += stream.width
-        return own
+    def _call(self, machine: Machine, shared: Array, out: Array | None = None) -> None:
+        machine.fly(self._state, self._prepared[id(machine)], shared, out)
 
     def _drop(self) -> None:
         """Let flights that are over make room, where that saves a group of lanes."""
@@ -204,7 +189,6 @@ class _Block:
         self._prepared = {
             key: grouped(ungrouped(prepared, count)[:, flying], lanes) for key, prepared in self._prepared.items()
         }
-        self._noise = [stream.only(flying) for stream in self._noise]
 
     def _keep(self, flights: NDArray[np.intp], rows: Array) -> None:
         self._common.state[:, flights] = rows

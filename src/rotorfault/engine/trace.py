@@ -57,7 +57,7 @@ class Tape:
         return self.term("const", float(value), math.copysign(1.0, value))
 
     def leaves(self, kind: str, count: int) -> list[Term]:
-        """Rows that are read: 'par' (parameters of the flight), 'state', 'shared' or 'own' (inputs of each step)."""
+        """Rows that are read: 'par' (parameters of the flight), 'state', 'shared' (inputs of each step)."""
         return [self.term(kind, i) for i in range(count)]
 
     def lift(self, value: Operand) -> Term:
@@ -79,7 +79,7 @@ class Term:
         elif op == "par":
             self.level = 1
         elif isinstance(args[0], Term):
-            self.level = max(arg.level for arg in args)
+            self.level = max(arg.level for arg in args if isinstance(arg, Term))
         else:
             self.level = 2
 
