@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -285,6 +286,43 @@ def tune(
     else:
         _load("files").write_atomically(out, lambda temporary: temporary.write_text(text, encoding="utf-8"))
         typer.echo(f"wrote {out}, objective {tuned.record['objective']:g}")
+
+
+@app.command()
+def bench(
+    with_peers: Annotated[
+        bool, typer.Option("--peers", help="Also crazyflow, RotorPy and l2f, each installed on first use (8 GB).")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer and shorter repetitions: half a minute.")] = False,
+    as_json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here too.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw error against cost (.png, .svg, .pdf); needs heyoka.")
+    ] = None,
+) -> None:
+    """Measure speed and accuracy on this machine: flights, batches, Riccati solvers, latency, and other simulators.
+
+    Takes some minutes on an idle machine; anything else that runs meanwhile falsifies it. Keys that stay:
+    batch.10000.steps_per_s_per_core, batch.10000.simulated_s_per_s_per_core, peers.crazyflow.steps_per_s_per_core.
+
+    Example: rotorfault bench --peers --json bench.json --figure error-cost.png
+    """
+    files = _load("files")
+    for path in (as_json, figure):
+        if path is not None:
+            files.output_folder(path.parent)
+    # Before NumPy is loaded: with problems this small the threads of BLAS only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    study = _load("bench.study")
+    found = study.run(with_peers, quick, lambda line: typer.echo(f"measuring: {line}", err=True))
+    typer.echo(study.text(found))
+    if as_json is not None:
+        study.save(found, as_json)
+        typer.echo(f"\nwrote {as_json}")
+    if figure is not None:
+        _load("bench.accuracy_figure").save(found, figure)
+        typer.echo(f"wrote {figure}")
 
 
 def main() -> None:

@@ -76,7 +76,7 @@ class CompiledFunction:
         return out
 
     def bound(self, groups: Array, out: Array) -> Callable[[], None]:
-        """`evaluate` with its arguments, to be called again and again; both arrays must outlive it."""
+        """`evaluate` with its arguments, to be called again and again."""
         return self._native.bound("evaluate", groups, out, len(groups))
 
 

@@ -68,9 +68,11 @@ class Native:
             self._functions[name] = kind(self._library[name])
 
     def bound(self, name: str, *arguments: Array | int) -> Callable[[], None]:
-        """A function with its arguments, to be called again and again; the arrays must outlive it."""
+        """A function with its arguments, to be called again and again."""
         pointers = [a.ctypes.data if isinstance(a, np.ndarray) else a for a in arguments]
-        return partial(self._functions[name], *pointers)
+        call = partial(self._functions[name], *pointers)
+        call.needs = (self, *arguments)  # type: ignore[attr-defined]  # they must live as long as their addresses
+        return call
 
     def __call__(self, name: str, *arguments: Array | int) -> None:
         """Call a function; arrays must be contiguous."""

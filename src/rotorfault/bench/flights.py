@@ -1,0 +1,153 @@
+"""Speed of flights: one alone, and batches on one core and on all, through the public functions.
+
+The flight is the paper's set point with everything in the loop: rigid body on a quaternion by RK4 at 1 ms, rotor lag
+and limits, drag and wind, two rotor faults, Luenberger diagnosis with its decision, effectiveness allocation, ROISMC
+with one exact Newton-Kleinman step of its Riccati equation at each sampling instant, and all scores. In a batch mass,
+inertia, wind, faults and start differ from flight to flight, and none is the same as another. What is timed is the
+whole engine call: from parameters to scores. Only steps of flights that still fly are counted.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rotorfault.engine import load_engine
+from rotorfault.engine.batch import Batch
+from rotorfault.flight import fly
+from rotorfault.many import fly_many
+from rotorfault.scenario import Scenario, load_scenario
+from rotorfault.sweep import assemble_group, checked_columns, groups_of
+
+SIZES = (100, 1_000, 10_000)
+PERIOD = 1e-3  # s, of sampling and integration
+
+Say = Callable[[str], None]
+
+
+def scenario(duration: float, **settings: Any) -> Scenario:
+    """The flight that is measured."""
+    given = {"controller.kind": "roismc", "plant": "rigid_body", "duration": duration} | settings
+    return load_scenario("paper-set-point", given)
+
+
+def different(count: int, seed: int = 1) -> dict[str, Any]:
+    """What differs between the flights of a batch: near enough to the paper's for nearly all to fly to their end."""
+    draw = np.random.default_rng(seed)
+    return {
+        "mismatch.mass": draw.uniform(0.95, 1.05, count),
+        "mismatch.inertia.0": draw.uniform(0.95, 1.05, count),
+        "wind.velocity_W.0": draw.uniform(-4.0, 4.0, count),
+        "wind.velocity_W.1": draw.uniform(-4.0, 4.0, count),
+        "fault.0.loss": draw.uniform(0.1, 0.3, count),
+        "fault.0.time": draw.uniform(0.5, 1.8, count),
+        "fault.1.loss": draw.uniform(0.1, 0.35, count),
+        "start.position.0": draw.uniform(0.0, 0.2, count),
+        "seed": np.arange(count),
+    }
+
+
+def batch_of(count: int, duration: float, **settings: Any) -> Batch:
+    """A batch of different flights that records nothing."""
+    one = scenario(duration, **settings)
+    return assemble_group(groups_of(one, checked_columns(one, different(count)))[0])._replace(every=0)
+
+
+def timed(batch: Batch, threads: int, repeats: int) -> float:
+    """Flight-steps per second, the median of several calls."""
+    run = load_engine("simd")
+    run(batch._replace(reference=batch.reference[:10]))  # compiled, and warm
+    speeds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        done = run(batch, threads=threads)
+        speeds.append(done.flown / (time.perf_counter() - start))
+    return statistics.median(speeds)
+
+
+def speed(steps_per_s: float, cores: int) -> dict[str, float]:
+    """The usual figures of a speed."""
+    return {
+        "steps_per_s": steps_per_s,
+        "steps_per_s_per_core": steps_per_s / cores,
+        "simulated_s_per_s_per_core": steps_per_s / cores * PERIOD,
+    }
+
+
+def measure_batches(cores: int, quick: bool, say: Say) -> dict[str, Any]:
+    """Batches of `SIZES`, each on one core and on all, some 20 million steps a call (quick: 5)."""
+    found: dict[str, Any] = {}
+    repeats, wanted = (3, 5e6) if quick else (7, 2e7)
+    for size in SIZES:
+        duration = float(np.clip(round(wanted / size * PERIOD, 1), 0.2, 20.0))
+        say(f"batch of {size:,}: {duration:g} s each")
+        batch = batch_of(size, duration)
+        one = speed(timed(batch, 1, repeats), 1)
+        found[str(size)] = one | {"flight_seconds": duration}
+        if cores > 1:
+            together = timed(batch, cores, repeats)
+            found[str(size)]["all_cores"] = speed(together, cores) | {
+                "cores": cores,
+                "over_one_core": together / one["steps_per_s"],
+            }
+    return found
+
+
+def measure_noise(quick: bool, say: Say) -> dict[str, Any]:
+    """What sensor noise (12 numbers a step) and gusts (3) cost, as a factor on the time of a batch of 1,000."""
+    say("sensor noise and gusts")
+    repeats, duration = (3, 1.0) if quick else (7, 4.0)
+    # A threshold that noise does not reach, so that the same flights fly to their end.
+    calm = {"diagnosis.decision.threshold": 0.4}
+    cases: dict[str, dict[str, Any]] = {
+        "without": {},
+        "noise": {"sensors.kind": "noisy"},
+        "gusts": {"wind.kind": "dryden"},
+        "noise_and_gusts": {"sensors.kind": "noisy", "wind.kind": "dryden"},
+    }
+    found = {name: timed(batch_of(1_000, duration, **calm, **case), 1, repeats) for name, case in cases.items()}
+    return {
+        name: {"steps_per_s_per_core": value, "cost_factor": found["without"] / value}
+        for name, value in found.items()
+    }
+
+
+def measure_single(quick: bool, say: Say) -> dict[str, Any]:
+    """One flight of 20 s through `rotorfault.fly`: with all its records as arrays, once the loop is compiled."""
+    say("one flight of 20 s")
+    flown = scenario(20.0)
+    fly(flown)
+    times = []
+    for _ in range(3 if quick else 9):
+        start = time.perf_counter()
+        fly(flown)
+        times.append(time.perf_counter() - start)
+    seconds = statistics.median(times)
+    return {"seconds": seconds, "steps_per_s": flown.steps / seconds, "simulated_s_per_s": flown.duration / seconds}
+
+
+def measure_scaling(quick: bool, say: Say) -> dict[str, Any]:
+    """Time per flight and peak memory of `rotorfault.fly_many` from 1,000 flights to 100,000 of 0.1 s.
+
+    Memory is what Python and NumPy hold at most during the call, the columns that are given included.
+    """
+    found: dict[str, Any] = {}
+    flown = scenario(0.1)
+    fly_many(flown, different(64))
+    for size in (1_000, 10_000) if quick else (1_000, 10_000, 100_000):
+        say(f"{size:,} flights through fly_many")
+        columns = different(size)
+        start = time.perf_counter()
+        fly_many(flown, columns)
+        seconds = time.perf_counter() - start
+        tracemalloc.start()
+        fly_many(flown, columns)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        found[str(size)] = {"us_per_flight": 1e6 * seconds / size, "peak_memory_MB": most / 1e6}
+    return found

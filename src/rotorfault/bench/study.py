@@ -1,0 +1,236 @@
+"""All measurements in one run, and what they say as a table: `rotorfault bench`."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import os
+import platform
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rotorfault._version import __version__
+from rotorfault.bench import flights, latency, peers
+from rotorfault.bench.peak import peak_flops
+from rotorfault.engine import have_simd
+from rotorfault.engine.machine import Machines
+from rotorfault.errors import InputError
+from rotorfault.files import write_atomically
+
+Say = Callable[[str], None]
+FLOPS = {"fma": 2, "fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1}
+"""Floating-point operations of an instruction; comparisons, selections and bit operations count as none."""
+IDLE = "none"  # sort of instructions that only name places
+
+
+def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
+    """Measure everything.
+
+    Parameters
+    ----------
+    with_peers : bool
+        Also the other simulators, in environments that are made on first use.
+    quick : bool
+        Fewer and shorter repetitions.
+    say : callable
+        Is told what is being measured, line by line.
+
+    Returns
+    -------
+    dict
+        ``machine``, ``single``, ``batch`` (by size), ``operations``, ``noise``, ``scaling``, ``sdre``, ``latency``,
+        ``accuracy`` (None without heyoka), ``peers`` (empty unless asked for).
+
+    Raises
+    ------
+    InputError
+        If llvmlite is not installed.
+    """
+    if not have_simd():
+        raise InputError(
+            "the compiled engine needs llvmlite, which is not installed; nothing else is worth measuring"
+        )
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    say("peak of fused multiplications and additions")
+    peak = peak_flops(3 if quick else 9)
+    found: dict[str, Any] = {
+        "machine": {
+            "processor": _processor(),
+            "cores": cores,
+            "python": platform.python_version(),
+            "rotorfault": __version__,
+            "peak_gflops_per_core": peak * 1e-9,
+        },
+        "single": flights.measure_single(quick, say),
+        "batch": flights.measure_batches(cores, quick, say),
+        "noise": flights.measure_noise(quick, say),
+        "scaling": flights.measure_scaling(quick, say),
+    }
+    best = max(part["steps_per_s_per_core"] for part in found["batch"].values())
+    found["operations"] = _operations(best, peak)
+    say("Riccati solvers")
+    found["sdre"] = importlib.import_module("rotorfault.bench.sdre").measure(quick)
+    say("latency of a control update")
+    found["latency"] = latency.measure(quick)
+    found["accuracy"] = None
+    if importlib.util.find_spec("heyoka") is not None and importlib.util.find_spec("rotorfault.bench.accuracy"):
+        say("error against a truth by Taylor's method")
+        found["accuracy"] = importlib.import_module("rotorfault.bench.accuracy").measure(quick)
+    found["peers"] = peers.measure(list(peers.PEERS), quick, cores, say) if with_peers else {}
+    return found
+
+
+def save(found: dict[str, Any], path: Path) -> None:
+    """Write the numbers as JSON."""
+    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _operations(steps_per_s: float, peak: float) -> dict[str, Any]:
+    """Operations of a step, counted in the trace, and the share of the machine's peak that they come to."""
+    counts = Machines(flights.batch_of(8, 0.1)).get(with_signals=False).operations
+    flops = sum(FLOPS.get(sort, 0) * count for sort, count in counts.items())
+    return {
+        "instructions": sum(count for sort, count in counts.items() if sort != IDLE),
+        "by_sort": {sort: count for sort, count in sorted(counts.items(), key=lambda x: -x[1]) if sort != IDLE},
+        "flops": flops,
+        "gflops_per_core": flops * steps_per_s * 1e-9,
+        "share_of_peak": flops * steps_per_s / peak,
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+# --------------------------------------------------------------------------------------------------------------- text
+
+
+def text(found: dict[str, Any]) -> str:
+    """The numbers as tables to be read."""
+    parts = [_machine(found), _flights(found), _limits(found), _sdre(found["sdre"]), _latency(found["latency"])]
+    if found["accuracy"] is not None:
+        parts.append(importlib.import_module("rotorfault.bench.accuracy").text(found["accuracy"]))
+    if found["peers"]:
+        parts.append(_peers(found))
+    return "\n\n".join(parts)
+
+
+def _machine(found: dict[str, Any]) -> str:
+    m = found["machine"]
+    return (
+        f"{m['processor']}, {m['cores']} cores, Python {m['python']}, rotorfault {m['rotorfault']}\n"
+        f"peak of fused multiplications and additions: {m['peak_gflops_per_core']:.1f} Gflop/s per core"
+    )
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
+    lines = [
+        "  ".join(
+            cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in [head, *rows]
+    ]
+    lines.insert(1, "  ".join("-" * w for w in widths))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _flights(found: dict[str, Any]) -> str:
+    rows = []
+    for size, part in found["batch"].items():
+        together = part.get("all_cores")
+        rows.append(
+            (
+                f"batch of {int(size):,}",
+                f"{part['steps_per_s'] * 1e-6:.2f} M",
+                f"{part['simulated_s_per_s_per_core']:,.0f}",
+                "" if together is None else f"{together['steps_per_s'] * 1e-6:.2f} M",
+                "" if together is None else f"{together['over_one_core']:.2f}",
+            )
+        )
+    single = found["single"]
+    head = ("flights", "steps/s, one core", "simulated s/s", "all cores", "over one core")
+    return (
+        _table(head, rows)
+        + f"\none flight of 20 s through rf.fly, with all records: {single['seconds']:.3f} s"
+        + f" ({single['simulated_s_per_s']:,.0f} simulated s/s)"
+    )
+
+
+def _limits(found: dict[str, Any]) -> str:
+    o, noise = found["operations"], found["noise"]
+    sorts = ", ".join(f"{count} {sort}" for sort, count in list(o["by_sort"].items())[:9])
+    scaling = ", ".join(
+        f"{int(size):,}: {part['us_per_flight']:.0f} us, {part['peak_memory_MB']:.0f} MB"
+        for size, part in found["scaling"].items()
+    )
+    return (
+        f"a step: {o['instructions']:,} vector instructions ({sorts} ...), {o['flops']:,} flop;"
+        f" {o['gflops_per_core']:.1f} Gflop/s, {100 * o['share_of_peak']:.0f} % of the peak\n"
+        f"cost of sensor noise {noise['noise']['cost_factor']:.2f}, of gusts {noise['gusts']['cost_factor']:.2f}, "
+        f"of both {noise['noise_and_gusts']['cost_factor']:.2f} times that without\n"
+        f"flights of 0.1 s through fly_many, time per flight and peak memory: {scaling}"
+    )
+
+
+def _sdre(sdre: dict[str, Any]) -> str:
+    parts = []
+    for size, part in sdre["sizes"].items():
+        rows = [
+            (name, "not installed", "")
+            if solver is None
+            else (name, f"{solver['us']:.3f}", f"{solver['residual']:.0e}")
+            for name, solver in part["solvers"].items()
+        ]
+        parts.append(
+            _table((f"Riccati equation, n = {size}", "us per solve", "residual"), rows)
+            + f"\nin batch {part['batch_over_scipy']:,.0f} times faster than SciPy and "
+            f"{part['batch_over_best_package']:,.0f} times than {part['best_package']}; "
+            f"from a single call {part['single_over_scipy']:,.0f} times faster than SciPy"
+        )
+    return "\n\n".join(parts)
+
+
+def _latency(found: dict[str, Any]) -> str:
+    rows = [(name, f"{part['median_us']:,.1f}", f"{part['p99_9_us']:,.1f}") for name, part in found.items()]
+    return _table(("one control update", "median us", "99.9 % us"), rows)
+
+
+def _peers(found: dict[str, Any]) -> str:
+    ours = found["batch"]["10000"]
+    rows = [
+        (
+            "rotorfault, whole fault-tolerant loop",
+            f"{ours['steps_per_s_per_core'] * 1e-6:.3f} M",
+            "1.000",
+            f"{ours['simulated_s_per_s_per_core']:,.0f}",
+            "1",
+        )
+    ]
+    for name, peer in found["peers"].items():
+        if "error" in peer:
+            rows.append((f"{name}: {peer['error'][:60]}", "", "", "", ""))
+            continue
+        for label, part in (
+            (name, peer),
+            *((f"{name}, {key}", part) for key, part in peer.get("variants", {}).items()),
+        ):
+            rows.append(
+                (
+                    f"{label} {peer['version'] if part is peer else ''}".strip(),
+                    f"{part['steps_per_s_per_core'] * 1e-6:.3f} M",
+                    f"{1e3 * part['step']:g}",
+                    f"{part['simulated_s_per_s_per_core']:,.0f}",
+                    f"{ours['steps_per_s_per_core'] / part['steps_per_s_per_core']:,.1f}",
+                )
+            )
+    head = ("simulator", "steps/s per core", "step ms", "simulated s/s per core", "ours over it, steps")
+    return _table(head, rows)
