@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 pytest.importorskip("llvmlite")
 
+from rotorfault.bench import flights, peak, study
 from rotorfault.bench.sdre import OURS, SCIPY, measure
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.geometry import Mat3, Vec3
@@ -41,3 +45,45 @@ def test_the_riccati_measurement_solves_what_it_times() -> None:
         assert part["best_package"] not in OURS
         assert part["batch_over_scipy"] >= part["batch_over_best_package"] > 0.0
         assert part["single_over_scipy"] > 0.0
+
+
+def test_bench_measures_everything_and_says_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small sizes; no time is judged, only that each number is there and is what it says."""
+    monkeypatch.setattr(flights, "SIZES", (9, 10_000))
+    monkeypatch.setattr(flights, "different", lambda count, seed=1: {"seed": np.arange(min(count, 20))})
+    monkeypatch.setattr(study.importlib.util, "find_spec", lambda name: None if name == "heyoka" else True)
+    said: list[str] = []
+    found = study.run(False, True, said.append)
+    assert said
+    study.save(found, tmp_path / "bench.json")
+    saved = json.loads((tmp_path / "bench.json").read_text())
+    assert saved["batch"]["10000"]["steps_per_s_per_core"] > 0.0
+    assert saved["batch"]["10000"]["simulated_s_per_s_per_core"] == pytest.approx(
+        1e-3 * saved["batch"]["10000"]["steps_per_s_per_core"]
+    )
+    assert 0.0 < saved["operations"]["share_of_peak"] < 1.0
+    assert saved["operations"]["flops"] > 1000
+    assert set(saved["latency"]) == {"simd", "python", "numpy"}
+    table = study.text(found)
+    assert "batch of 10,000" in table
+    assert max(map(len, table.splitlines())) < 240
+
+
+def test_peers_stand_in_the_table() -> None:
+    ours = {"steps_per_s": 8e6, "steps_per_s_per_core": 8e6, "simulated_s_per_s_per_core": 8e3}
+    peer = {"version": "1.0", "step": 0.002, "steps_per_s_per_core": 2e6, "simulated_s_per_s_per_core": 4e3}
+    table = study._peers(
+        {
+            "batch": {"10000": ours},
+            "peers": {"one": peer | {"variants": {"euler": peer}}, "two": {"error": "no disk"}},
+        }
+    )
+    assert "4.0" in table
+    assert "one, euler" in table
+    assert "two: no disk" in table
+
+
+def test_an_operation_of_the_peak_is_what_it_counts() -> None:
+    """The kernel that the share refers to does as many fused operations as it says."""
+    text = peak._module(8)
+    assert text.count("@llvm.fma.v8f64(") == peak.CHAINS + 1  # and its declaration

@@ -189,6 +189,24 @@ def test_numbers_depend_on_nothing_but_the_flight(monkeypatch: pytest.MonkeyPatc
             np.testing.assert_array_equal(found.signals[:, :, flying], wanted.signals[::every, :, flying])
 
 
+@pytest.mark.parametrize("lanes", [2, 4, 8])
+@pytest.mark.parametrize("step", [0.005, 0.001])
+def test_the_width_of_vectors_changes_nothing(monkeypatch: pytest.MonkeyPatch, lanes: int, step: float) -> None:
+    """On a processor with shorter vectors the same code flies the same numbers, five steps in a period or one."""
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine import machine, native, simd
+
+    batch = many(9, step=step)._replace(every=50)
+    wanted = simd.run(batch)
+    monkeypatch.setenv("ROTORFAULT_CACHE", "")
+    monkeypatch.setattr(machine, "_LOADED", {})
+    monkeypatch.setattr(cache, "_KEPT", {})
+    monkeypatch.setattr(native, "lanes", lambda: lanes)
+    found = simd.run(batch)
+    np.testing.assert_array_equal(found.signals, wanted.signals)
+    np.testing.assert_array_equal(found.state, wanted.state)
+
+
 def test_a_flight_that_is_over_stops_costing(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("llvmlite")
     from rotorfault.engine import simd

@@ -22,7 +22,7 @@ from rotorfault.progress import Bar
 from rotorfault.registry import unknown
 from rotorfault.scenario import Scenario
 from rotorfault.score_table import ScoreTable, score_table
-from rotorfault.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.sweep import assemble_group, check_group, checked_columns, groups_of
 from rotorfault.telemetry import SIGNAL_NAMES, quantities
 
 if TYPE_CHECKING:
@@ -145,6 +145,9 @@ def fly_many(
     count = len(next(iter(columns.values())))
     rows = _rows(record)
     groups = groups_of(checked, columns)
+    if count > AT_ONCE or len(groups) > 1:  # else it is seen in time
+        for group in groups:
+            check_group(group)
     steps = {group.scenario.steps for group in groups}
     if rows and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
         raise InputError("recorded flights must have one length and one recording period; fly them apart")

@@ -83,7 +83,7 @@ def groups_of(scenario: Scenario, columns: Columns) -> list[Group]:
     # A number may still be one of the loop's structure: an allocator's, the delay of a diagnosis.
     loop = structure(build(scenario))
     for key in sorted(numeric):
-        other = _overridden(scenario, {key: float(columns[key][-1])}, "vary")
+        other = _overridden(scenario, {key: float(columns[key][-1])}, f"flight {count - 1}")
         if structure(build(other)) != loop:
             numeric.discard(key)
     structural = [key for key in columns if key not in numeric and key != "seed"]
@@ -101,6 +101,19 @@ def groups_of(scenario: Scenario, columns: Columns) -> list[Group]:
         Group(one, which, {key: columns[key][which].astype(float) for key in numeric}, seeds[which])
         for one, which in parts
     ]
+
+
+def check_group(group: Group) -> None:
+    """See that every value of a group is allowed.
+
+    Raises
+    ------
+    InputError
+        If one is not; names the flight.
+    """
+    assembly = _Assembly(group, slice(None))
+    for name in {".".join(key.split(".")[: 2 if key.startswith("fault.") else 1]) for key in group.columns}:
+        assembly.objects(name)
 
 
 def assemble_group(group: Group, part: slice = slice(None)) -> Batch:

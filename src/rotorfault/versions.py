@@ -8,7 +8,7 @@ from importlib import metadata
 
 from rotorfault._version import __version__
 
-_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "heyoka")
+_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "llvmlite")
 
 
 def versions() -> dict[str, str]:

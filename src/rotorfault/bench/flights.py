@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from rotorfault.engine import load_engine
-from rotorfault.engine.batch import Batch
+from rotorfault.engine.batch import Batch, no_watch
 from rotorfault.flight import fly
 from rotorfault.many import fly_many
 from rotorfault.scenario import Scenario, load_scenario
@@ -61,11 +61,11 @@ def batch_of(count: int, duration: float, **settings: Any) -> Batch:
 def timed(batch: Batch, threads: int, repeats: int) -> float:
     """Flight-steps per second, the median of several calls."""
     run = load_engine("simd")
-    run(batch._replace(reference=batch.reference[:10]))  # compiled, and warm
+    run(batch._replace(reference=batch.reference[:10]), no_watch)  # compiled, and warm
     speeds = []
     for _ in range(repeats):
         start = time.perf_counter()
-        done = run(batch, threads=threads)
+        done = run(batch, no_watch, threads)
         speeds.append(done.flown / (time.perf_counter() - start))
     return statistics.median(speeds)
 

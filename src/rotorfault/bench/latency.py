@@ -65,18 +65,17 @@ def _instant(batch: Batch) -> tuple[Any, ...]:
 
 
 def _floats(batch: Batch) -> Callable[[], object]:
-    instant = _instant(batch)
-    step, period = batch.loop.autopilot.step, batch.parameters.period
-    return lambda: step(*instant, period)
+    arguments, step = [*_instant(batch), batch.parameters.period], batch.loop.autopilot.step
+    return lambda: step(*arguments)
 
 
 def _arrays(batch: Batch) -> Callable[[], object]:
     instant = unflatten(_instant(batch), list(columns(_instant(batch), 1)))
-    step, period = batch.loop.autopilot.step, batch.parameters.period
+    arguments, step = [*instant, batch.parameters.period], batch.loop.autopilot.step
 
     def update() -> object:
         with np.errstate(all="ignore"):
-            return step(*instant, period)
+            return step(*arguments)
 
     return update
 
@@ -84,8 +83,9 @@ def _arrays(batch: Batch) -> Callable[[], object]:
 def _compiled(batch: Batch) -> Callable[[], object]:
     instant, period = _instant(batch), batch.parameters.period
 
-    def update(*arguments: Any) -> Any:
-        memory, command, _ = batch.loop.autopilot.step(*arguments, period)
+    def update(*given: Any) -> Any:
+        arguments = [*given, period]
+        memory, command, _ = batch.loop.autopilot.step(*arguments)
         return memory, command
 
     compiled = CompiledFunction(update, *instant)

@@ -132,7 +132,7 @@ class Code:
     def load(self, pointer: str, offset: int) -> str:
         """A vector at an offset in doubles."""
         place = self.value(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}", "none")
-        return self.value(f"load {self.vector}, ptr {place}, align 64")
+        return self.value(f"load {self.vector}, ptr {place}, align {8 * self.lanes}")
 
     def broadcast(self, pointer: str, offset: int) -> str:
         """One double at an offset in all lanes."""
@@ -149,7 +149,7 @@ class Code:
     def store(self, number: str, pointer: str, offset: int) -> None:
         """Write a vector at an offset in doubles."""
         place = self.value(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}", "none")
-        self.lines.append(f"  store {self.vector} {number}, ptr {place}, align 64")
+        self.lines.append(f"  store {self.vector} {number}, ptr {place}, align {8 * self.lanes}")
         self.counts["store"] += 1
 
 

@@ -16,7 +16,7 @@ from rotorfault.scalar import Scalar
 
 R = TypeVar("R")
 
-# Multiplied, not divided: heyoka turns a division by a number into this, and then all engines round alike.
+# Multiplied, not divided: compiled code turns a division by a number into this, and then all engines round alike.
 _SIXTH = 1.0 / 6.0
 
 

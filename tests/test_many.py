@@ -1,0 +1,182 @@
+"""Many flights of one scenario: what may vary, that each is the flight that it would be alone, what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotorfault as rf
+from rotorfault import many
+from rotorfault.engine import have_simd
+from rotorfault.errors import InputError
+from rotorfault.scenario import Scenario, scenario_from
+from rotorfault.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.telemetry import SIGNAL_NAMES
+
+COUNT = 7
+DRAW = np.random.default_rng(3)
+EVERYTHING: dict[str, Any] = {
+    "mismatch.mass": DRAW.uniform(0.9, 1.1, COUNT),
+    "mismatch.inertia.2": DRAW.uniform(0.9, 1.1, COUNT),
+    "vehicle.linear_drag.value": DRAW.uniform(0.1, 0.3, COUNT),
+    "start.position.0": DRAW.uniform(-0.2, 0.2, COUNT),
+    "start.attitude.1": DRAW.uniform(-0.2, 0.2, COUNT),
+    "fault.0.loss": DRAW.uniform(0.0, 0.6, COUNT),
+    "fault.0.time": [0.05, 0.1, 0.15, 0.05, 0.1, 0.15, 0.2],
+    "wind.velocity_W.1": DRAW.uniform(-5.0, 5.0, COUNT),
+    "sensors.rate": DRAW.uniform(0.0, 0.01, COUNT),
+    "controller.law.eta.0": DRAW.uniform(3.0, 5.0, COUNT),
+    "diagnosis.decision.threshold": DRAW.uniform(0.1, 0.3, COUNT),
+    "seed": np.arange(COUNT) * 10**9,
+}
+
+
+def base(**tables: Any) -> Scenario:
+    return scenario_from(
+        {
+            "name": "base",
+            "vehicle": "paper",
+            "duration": 0.4,
+            "period": 0.002,
+            "step": 0.002,
+            "reference": {"kind": "set_point", "position": [0.2, -0.1, 0.3]},
+            "controller": {"kind": "smc", "preset": "none"},
+            "fault": [{"kind": "step", "rotor": 2, "time": 0.1, "loss": 0.2}],
+            "sensors": "noisy",
+            "wind": "dryden",
+        }
+        | tables,
+        "test",
+    )
+
+
+def columns(scenario: Scenario) -> dict[str, Any]:
+    """Those columns whose keys the scenario has."""
+    wanted = {}
+    for key, values in EVERYTHING.items():
+        try:
+            checked_columns(scenario, {key: values})
+            groups_of(scenario, checked_columns(scenario, {key: values}))
+        except InputError:
+            continue
+        wanted[key] = values
+    return wanted
+
+
+ENGINES = [name for name in ("simd", "numpy", "python") if name != "simd" or have_simd()]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_each_is_the_flight_that_it_would_be_alone(engine: str) -> None:
+    """To the last bit, whatever varies: vehicle, start, faults, wind, noise, gains, thresholds, seed."""
+    scenario = base()
+    vary = columns(scenario)
+    assert len(vary) >= 11
+    flights = rf.fly_many(scenario, vary, record=["position", "fault_flag.r2"], engine=engine)
+    assert len(flights) == COUNT
+    for i in (0, 3, 6):
+        alone = flights.replay(i, engine=engine)
+        records = len(alone.data["time"])
+        np.testing.assert_array_equal(flights.signals[:records, :3, i], alone.data["position"].values)
+        np.testing.assert_array_equal(flights.signals[:records, 3, i], alone.data["fault_flag"].values[:, 1])
+        summary = alone.summary()
+        assert flights.table["outcome"][i] == summary["outcome"]
+        assert flights.table["cost"][i] == pytest.approx(summary["cost"], rel=1e-12)
+    assert len(np.unique(flights.table["cost"])) == COUNT
+
+
+def test_what_changes_the_loop_makes_groups() -> None:
+    vary = {
+        "controller.kind": ["smc", "roismc", "smc", "sdre", "roismc", "smc"],
+        "fault.0.rotor": [2, 2, 3, 2, 2, 2],
+        "allocation.effectiveness_min": [0.05, 0.05, 0.05, 0.05, 0.1, 0.05],
+        "mismatch.mass": np.linspace(0.9, 1.1, 6),
+    }
+    scenario = base(allocation="effectiveness", sensors="ideal", wind="none")
+    groups = groups_of(scenario, checked_columns(scenario, vary))
+    assert sorted(group.flights.tolist() for group in groups) == [[0, 5], [1], [2], [3], [4]]
+    assert all(set(group.columns) == {"mismatch.mass"} for group in groups)
+    flights = rf.fly_many(scenario, vary)
+    for i in range(6):
+        assert flights.table["cost"][i] == pytest.approx(flights.replay(i).summary()["cost"], rel=1e-12), i
+
+
+def test_numbers_are_assembled_as_one_by_one() -> None:
+    scenario = base()
+    vary = columns(scenario)
+    (group,) = groups_of(scenario, checked_columns(scenario, vary))
+    whole, part = assemble_group(group), assemble_group(group, slice(2, 5))
+    assert (whole.flights, part.flights) == (COUNT, 3)
+    assert part.seeds == whole.seeds[2:5]
+
+
+def test_many_are_flown_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = base(sensors="ideal", wind="none")
+    vary = {"fault.0.loss": np.linspace(0.0, 0.9, 23), "controller.kind": ["smc", "roismc"] * 11 + ["smc"]}
+    wanted = rf.fly_many(scenario, vary)
+    monkeypatch.setattr(many, "AT_ONCE", 5)
+    found = rf.fly_many(scenario, vary)
+    for name, column in wanted.table.columns.items():
+        np.testing.assert_array_equal(found.table[name], column, err_msg=name)
+
+
+def test_results_as_a_dataset() -> None:
+    flights = rf.fly_many(base(), {"seed": range(4)}, record=["thrust"], record_period=0.02)
+    data = flights.to_xarray()
+    assert data["signal.thrust.r1"].dims == ("time", "flight")
+    assert data["signal.thrust.r1"].attrs["units"] == "N"
+    assert data["outcome"].shape == data["vary.seed"].shape == (4,)
+    assert data["time"].values.tolist() == pytest.approx([0.02 * k for k in range(20)])
+    assert "4" in repr(flights)
+    assert sum(flights.table.count().values()) == 4
+
+
+@pytest.mark.parametrize(
+    ("vary", "message"),
+    [
+        ({}, "nothing varies; give at least one key"),
+        ({"fault.0.loss": []}, "one value per flight"),
+        ({"fault.0.loss": 0.3}, "a list with one value per flight"),
+        ({"fault.0.loss": [0.1, 0.2], "seed": [1]}, "columns differ in length"),
+        ({"fault.0.loss": [0.1, 1.2]}, "flight 1: fault.0.loss: .*got 1.2"),
+        ({"fault.0.los": [0.1]}, "did you mean 'loss'"),
+        ({"nothing.such": [0.1]}, "unknown key"),
+        ({"fault.3.loss": [0.1]}, "no index into a list of 1"),
+        ({"mismatch.mass": [1.0, float("nan")]}, "flight 1"),
+        ({"seed": [0.5]}, "seed: got"),
+        ({"seed": [-1]}, "allowed: whole numbers from 0"),
+        ({"controller.kind": ["smc", "scm"]}, "unknown controller 'scm'"),
+        ({3: [1.0]}, "allowed: dotted keys"),
+    ],
+)
+def test_bad_columns_are_refused_before_anything_flies(
+    vary: dict[Any, Any], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(name: str) -> Any:
+        raise AssertionError("flown")
+
+    monkeypatch.setattr(many, "load_engine", never)
+    with pytest.raises(InputError, match=message):
+        rf.fly_many(base(), vary)
+
+
+def test_a_bad_value_far_behind_is_refused_before_anything_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(many, "AT_ONCE", 2)
+    monkeypatch.setattr(many, "load_engine", None)
+    with pytest.raises(InputError, match="flight 3: fault.0.loss"):
+        rf.fly_many(base(), {"fault.0.loss": [0.1, 0.2, 0.3, 1.4, 0.5]})
+
+
+def test_bad_records_are_refused() -> None:
+    with pytest.raises(InputError, match="did you mean 'position'"):
+        rf.fly_many(base(), {"seed": range(2)}, record=["positon"])
+    with pytest.raises(InputError, match=r"allowed: a list of names, such as \['position'\]"):
+        rf.fly_many(base(), {"seed": range(2)}, record="position")
+    with pytest.raises(InputError, match="take more memory than there is"):
+        rf.fly_many(base(), {"seed": range(100_000)}, record=[name.partition(".")[0] for name in SIGNAL_NAMES])
+    with pytest.raises(InputError, match="one length and one recording period"):
+        rf.fly_many(base(), {"duration": [0.2, 0.4]}, record=["position"])
+    with pytest.raises(InputError, match="there is no flight 2"):
+        rf.fly_many(base(), {"seed": range(2)}).replay(2)
