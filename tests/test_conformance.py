@@ -185,10 +185,12 @@ def test_it_flies(group: str, name: str, tmp_path: Path) -> None:
 
 
 @each_flight
-@pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
-def test_compiled_it_gives_the_same_numbers(parts: dict[str, str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ["simd", "numpy"])
+def test_every_engine_gives_the_same_numbers(engine: str, parts: dict[str, str], tmp_path: Path) -> None:
+    if engine == "simd" and not have_simd():
+        pytest.skip("needs llvmlite")
     flown = scenario(tmp_path, **parts)
-    found, wanted = run(flown, "simd"), run(flown, "python")
+    found, wanted = run(flown, engine), run(flown, "python")
     size = np.maximum(1.0, np.abs(wanted).max(axis=0))
     worst = (np.abs(found - wanted) / size).max(axis=0)
     assert worst.max() <= 1e-9, SIGNAL_NAMES[int(np.argmax(worst))]

@@ -165,7 +165,7 @@ def test_bad_columns_are_refused_before_anything_flies(
 def test_a_bad_value_far_behind_is_refused_before_anything_flies(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(many, "AT_ONCE", 2)
     monkeypatch.setattr(many, "load_engine", None)
-    with pytest.raises(InputError, match="flight 3: fault.0.loss"):
+    with pytest.raises(InputError, match=r"flight 3: fault\.0\.loss"):
         rf.fly_many(base(), {"fault.0.loss": [0.1, 0.2, 0.3, 1.4, 0.5]})
 
 

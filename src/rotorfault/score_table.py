@@ -1,6 +1,8 @@
 """The scores of a batch as a table: one row per flight, columns named as in the summary of a single flight.
 
-Definitions are those of `rotorfault.metrics`. Beside them: ``lowest`` [m], the least height; ``onset.R`` and
+Definitions are those of `rotorfault.metrics`. Beside them: ``lowest`` [m], the least height, ``lowest_after_loss``
+[m], the same from the first true loss on; ``velocity_end`` [m/s]; ``late_position_rms`` [m] and ``late_yaw_rms``
+[rad], root mean square errors over the last half of the flight (for flights that lasted); ``onset.R`` and
 ``detected.R`` [s], when rotor R first truly lost thrust and when its flag rose from then on. What a flight has no
 number for is NaN.
 """
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from rotorfault.engine.batch import Array, Batch, columns
 from rotorfault.metrics import SURVIVED
 from rotorfault.records import unflatten
-from rotorfault.scoring import KINDS, Scores, ScoringParameters
+from rotorfault.scoring import FAR, KINDS, Scores, ScoringParameters
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "yaw")
@@ -87,10 +89,16 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table |= _named("attitude_mse", ANGLES, [x * share for x in scores.attitude_square])
         table |= _named("position_error_end", AXES, list(scores.position_error))
         table |= _named("attitude_end", ANGLES, list(scores.attitude))
+        table |= _named("velocity_end", AXES, list(scores.velocity))
+        late = np.maximum(batch.steps - parameters.half, 1.0)
+        lasted = scores.over == 0.0
+        table["late_position_rms"] = np.where(lasted, np.sqrt(sum(scores.late_square) / late), np.nan)
+        table["late_yaw_rms"] = np.where(lasted, np.sqrt(scores.late_yaw_square / late), np.nan)
         table["cost"] = 0.5 * dt * (scores.cost - 0.5 * (scores.cost_first + scores.cost_last))
         table["tilt_max"] = np.arccos(np.clip(scores.cosine_least, -1.0, 1.0))
         table |= _named("attitude_max", ANGLES, list(scores.attitude_most))
         table["lowest"] = scores.lowest
+        table["lowest_after_loss"] = np.where(scores.lowest_after < FAR, scores.lowest_after, np.nan)
         table["control_total_variation"] = scores.variation
         table["saturated_fraction"] = scores.saturated * share
         table["outside_layer_fraction"] = scores.outside_layer * share

@@ -75,16 +75,19 @@ class Scores(NamedTuple):
     seen: Scalar  # instants counted
     last_outside: Vec3  # number of the last step outside the settling band, -1 before any
     late_square: Vec3  # m^2: sum of squared errors over the last half
+    late_yaw_square: Scalar  # rad^2: the same of yaw
     position_square: Vec3  # m^2: sum of squared errors
     attitude_square: Vec3  # rad^2: the same against (0, 0, yaw reference)
     position_error: Vec3  # m, at the last instant
     attitude: Vec3  # rad, at the last instant
+    velocity: Vec3  # m/s, at the last instant
     cost: Scalar  # sum of the cost's rate
     cost_first: Scalar  # its rate at the first instant
     cost_last: Scalar  # and at the last
     cosine_least: Scalar  # of the tilt
     attitude_most: Vec3  # rad, magnitudes
     lowest: Scalar  # m
+    lowest_after: Scalar  # m: from the first true loss on
     variation: Scalar  # N: sum of changes of the commands
     command: PerRotor  # N, at the last instant
     saturated: Scalar  # instants with a command at a limit
@@ -118,12 +121,12 @@ class Scoring:
         """Nothing counted."""
         none, never = zeros(), Vec3(-1.0, -1.0, -1.0)
         return Scores(
-            over=0.0, end=0.0, seen=0.0, last_outside=never, late_square=none, position_square=none,
-            attitude_square=none, position_error=none, attitude=none, cost=0.0, cost_first=0.0, cost_last=0.0,
-            cosine_least=1.0, attitude_most=none, lowest=FAR, variation=0.0, command=PerRotor.all(0.0),
-            saturated=0.0, outside_layer=0.0, given_up=none, onset=PerRotor.all(-1.0), detected=PerRotor.all(-1.0),
-            flags=PerRotor.all(0.0), false_alarms=0.0, riccati_residual=0.0, riccati_guarded=0.0, touched=0.0,
-            gentle=1.0, rest=0.0,
+            over=0.0, end=0.0, seen=0.0, last_outside=never, late_square=none, late_yaw_square=0.0,
+            position_square=none, attitude_square=none, position_error=none, attitude=none, velocity=none, cost=0.0,
+            cost_first=0.0, cost_last=0.0, cosine_least=1.0, attitude_most=none, lowest=FAR, lowest_after=FAR,
+            variation=0.0, command=PerRotor.all(0.0), saturated=0.0, outside_layer=0.0, given_up=none,
+            onset=PerRotor.all(-1.0), detected=PerRotor.all(-1.0), flags=PerRotor.all(0.0), false_alarms=0.0,
+            riccati_residual=0.0, riccati_guarded=0.0, touched=0.0, gentle=1.0, rest=0.0,
         )  # fmt: skip
 
     def step(
@@ -175,7 +178,8 @@ class Scoring:
         if self.ground:
             # The end is told of all instants, also of those on the ground.
             error = signals.position - signals.position_reference
-            after = select_record(counted, after._replace(position_error=error, attitude=signals.attitude), after)
+            ending = after._replace(position_error=error, attitude=signals.attitude, velocity=signals.velocity)
+            after = select_record(counted, ending, after)
         return after._replace(
             over=select(flying, code, scores.over),
             end=select(both(flying, greater(code, 0.5)), step, scores.end),
@@ -218,16 +222,22 @@ class Scoring:
                 scores.last_outside, error, parameters.settle_band,
             ),
             late_square=_each(lambda old, e: select(late, old + e, old), scores.late_square, square),
+            late_yaw_square=select(late, scores.late_yaw_square + turn.z * turn.z, scores.late_yaw_square),
             position_square=scores.position_square + square,
             attitude_square=scores.attitude_square + turn.times(turn),
             position_error=error,
             attitude=signals.attitude,
+            velocity=signals.velocity,
             cost=scores.cost + rate,
             cost_first=select(first, rate, scores.cost_first),
             cost_last=rate,
             cosine_least=minimum(scores.cosine_least, cosine),
             attitude_most=_each(lambda old, a: maximum(old, absolute(a)), scores.attitude_most, signals.attitude),
             lowest=minimum(scores.lowest, signals.position.z),
+            lowest_after=select(
+                onset.map(lambda began: greater(began, -0.5)).reduce(either),
+                minimum(scores.lowest_after, signals.position.z), scores.lowest_after,
+            ),
             variation=select(first, 0.0, scores.variation + changes.sum()),
             command=command,
             saturated=scores.saturated + at_limit.reduce(either),
