@@ -109,6 +109,28 @@ def test_trim_prints_margins() -> None:
         assert word in done.stdout.lower()
 
 
+def test_trim_says_what_losses_leave_of_hover() -> None:
+    done = run("trim", "hummingbird", "--loss", "2=0.9", "--loss", "3=0.1")
+    assert done.returncode == 0, done.stderr
+    for line in (
+        "rotor 2 lost 0.9, rotor 3 lost 0.1",
+        "yaw held      no",
+        "yaw given up  yes",
+        "yaw torque left over",
+    ):
+        assert line in done.stdout
+
+
+@pytest.mark.parametrize("losses", [("1",), ("5=0.1",), ("1=1.5",), ("x=0.1",), ("1=nan",), ("1=0.1", "1=0.2")])
+def test_trim_refuses_losses_that_are_none(losses: tuple[str, ...]) -> None:
+    done = run("trim", "paper", *(word for pair in losses for word in ("--loss", pair)))
+    assert done.returncode == 2
+    assert f"--loss {losses[-1]}" in done.stderr
+    assert "allowed" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout
+
+
 # Arguments of `fly`, and what the one line of the error must name.
 BAD = [
     (("nowhere",), ["nowhere", "paper-set-point"]),

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from rotorfault.allocation.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.assembly import assemble
+from rotorfault.attainable_hover import parse_losses
 from rotorfault.closed_loop import Start, quiet
 from rotorfault.control.protocol import CONTROLLERS
 from rotorfault.control.python_controller import PythonController
 from rotorfault.errors import InputError
-from rotorfault.geometry import Vec3, zeros
+from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.linearisation import AXES, LinearLoop, linearise
 from rotorfault.margins import Margins, margins
 from rotorfault.scenario import load_scenario
@@ -300,13 +302,66 @@ def test_the_report_reads_well() -> None:
     assert max(len(line) for line in text.splitlines()) <= 110
 
 
+@pytest.mark.parametrize(
+    ("losses", "held", "given_up", "spinning"),
+    [
+        ([], "yes", "yes", "perhaps"),
+        (["1=0.6"], "no", "yes", "perhaps"),
+        (["1=1", "3=0.9"], "no", "no", "perhaps"),
+        (["1=1", "3=1"], "no", "no", "no"),
+    ],
+    ids=["sound", "one", "two", "dead"],
+)
+def test_the_report_says_what_losses_leave_of_hover(
+    losses: list[str], held: str, given_up: str, spinning: str
+) -> None:
+    report = trim_report("paper", "smc", loss=parse_losses(losses))
+    text = report.text()
+    assert f"yaw held      {held} " in text
+    assert f"yaw given up  {given_up} " in text
+    assert f"spinning      {spinning} " in text
+    assert "nan" not in text
+    assert "inf" not in text
+    assert ("yaw torque left over" in text) == (held == "no" and given_up == "yes")
+    sound = trim_report("paper", "smc").text()
+    assert text.replace(report_block(text), "") == sound.replace(report_block(sound), "")
+
+
+def report_block(text: str) -> str:
+    """The paragraph on attainable hover."""
+    return next(part for part in text.split("\n\n") if part.startswith("Attainable hover"))
+
+
+def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle: Vehicle) -> None:
+    loss = parse_losses(["3=0.25", "1=0.5"])
+    assert list(loss) == [0.5, 0.0, 0.25, 0.0]
+    report = trim_report(paper_vehicle, "smc", loss=loss).attainable
+    assert report.margin == hover_margin(paper_vehicle, loss)
+    assert list(report.reserve_without_yaw) == list(torque_reserve(paper_vehicle, loss, yaw=False))
+    assert report.critical_without_yaw.r4 == critical_loss(paper_vehicle, 4, yaw=False, loss=loss)
+    assert math.isnan(report.critical_with_yaw.r2)
+    # Rotors that cannot stop, and a partner that cannot give as much as they do at least.
+    stiff = paper_vehicle._replace(thrust_min=3.0)
+    assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"])).text()
+
+
 def test_a_report_on_an_unstable_loop_says_so(paper_vehicle: Vehicle) -> None:
     report = trim_report(paper_vehicle, PythonController(Spring(k1=3000.0, k2=3.0)), period=T)
     assert "not stable in hover" in "".join(report.warnings)
     assert "Margins: none" in report.text()
 
 
-@pytest.mark.parametrize("wrong", [{"controller": "pid"}, {"preset": "no"}, {"period": 0.0}, {"period": math.nan}])
+WRONG: list[dict[str, object]] = [
+    {"controller": "pid"},
+    {"preset": "no"},
+    {"period": 0.0},
+    {"period": math.nan},
+    {"loss": PerRotor(0.0, 1.1, 0.0, 0.0)},
+    {"loss": PerRotor(0.0, math.nan, 0.0, 0.0)},
+]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
 def test_wrong_input_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InputError, match="allowed"):
         trim_report("paper", **wrong)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The tables of docs/ that repeat what the code knows: settings, keys of files, signals.
+"""The tables of docs/ that repeat what the code knows: settings, keys of files, signals, what vehicles can bear.
 
     python tools/settings_tables.py                     print every table with its name
     python tools/settings_tables.py controllers/smc     print one
@@ -21,12 +21,13 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
 from rotorfault.catalogue import REGISTRIES
 from rotorfault.control.cascade import CascadeSettings
 from rotorfault.geometry import Mat3, PerRotor, Vec3
 from rotorfault.scenario import Mismatch, Part, Scenario, Start
 from rotorfault.telemetry import RPY, quantities
-from rotorfault.vehicle_file import Rotor, VehicleFile, load_vehicle
+from rotorfault.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
@@ -158,6 +159,7 @@ def tables() -> dict[str, str]:
     found["scenario"] = _settings_table(list(_scenario()))
     found["vehicle"] = _vehicle_table()
     found["signals"] = _signals_table()
+    found["attainable"] = _attainable_table()
     return found
 
 
@@ -221,6 +223,32 @@ def _signals_table() -> str:
         frame = "angles" if about.frame == RPY else about.frame.partition(":")[0]
         rows.append([f"`{name}`", dims, "" if about.unit == "1" else about.unit, frame, about.meaning])
     return _markdown(["signal", "over time and", "unit", "frame", "meaning"], rows)
+
+
+def _attainable_table() -> str:
+    """What each vehicle's hover in still air can bear."""
+    header = [
+        "vehicle",
+        "thrust-to-weight",
+        "one rotor, yaw held",
+        "one rotor, yaw given up",
+        "of two arms, together",
+    ]
+    header += ["torque to spare, sound [N m]", "one rotor dead [N m]"]
+    rows = []
+    for name in vehicle_names():
+        vehicle = load_vehicle(name).vehicle
+        sound, dead = PerRotor.all(0.0), PerRotor(1.0, 0.0, 0.0, 0.0)
+        margin, after = hover_margin(vehicle, sound), hover_margin(vehicle, dead)
+        together = critical_pair(vehicle, 1, 3, [0.5], yaw=False)[0] + 0.5
+        torque = ", ".join(f"{t:.3g}" for t in torque_reserve(vehicle, sound))
+        left = ", ".join(f"{t:.3g}" for t in list(torque_reserve(vehicle, dead, yaw=False))[:2])
+        losses = (critical_loss(vehicle, 1), critical_loss(vehicle, 1, yaw=False), together)
+        thrust = f"{margin.thrust_with_yaw / margin.needed:.4f}"
+        rows.append(
+            [f"`{name}`", thrust, *(f"{x:.4f}" for x in losses), torque, left if after.without_yaw else "none"]
+        )
+    return _markdown(header, rows)
 
 
 def _markdown(header: list[str], rows: list[list[str]]) -> str:

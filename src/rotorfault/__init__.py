@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rotorfault._version import __version__
 
 if TYPE_CHECKING:
+    from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
     from rotorfault.control.protocol import CONTROLLERS, ControlInputs, Controller, ControlOutput, no_telemetry
     from rotorfault.errors import InputError
     from rotorfault.flight import Flight, fly, fly_all, load, repeat
@@ -47,9 +48,12 @@ _HOME = {
     "Vec3": "geometry",
     "Vehicle": "vehicle",
     "Wrench": "signals",
+    "critical_loss": "allocation.hover",
+    "critical_pair": "allocation.hover",
     "fly": "flight",
     "fly_all": "flight",
     "fly_many": "many",
+    "hover_margin": "allocation.hover",
     "load": "flight",
     "load_scenario": "scenario",
     "load_vehicle": "vehicle_file",
@@ -57,6 +61,7 @@ _HOME = {
     "no_telemetry": "control.protocol",
     "repeat": "flight",
     "scenario_names": "scenario",
+    "torque_reserve": "allocation.hover",
     "trim_report": "trim",
     "vehicle_names": "vehicle_file",
 }
@@ -79,9 +84,12 @@ __all__ = [
     "Vehicle",
     "Wrench",
     "__version__",
+    "critical_loss",
+    "critical_pair",
     "fly",
     "fly_all",
     "fly_many",
+    "hover_margin",
     "load",
     "load_scenario",
     "load_vehicle",
@@ -89,6 +97,7 @@ __all__ = [
     "no_telemetry",
     "repeat",
     "scenario_names",
+    "torque_reserve",
     "trim_report",
     "vehicle_names",
 ]

@@ -214,12 +214,19 @@ def trim(
     controller: Annotated[str, typer.Option(help="Registered controller.")] = "roismc",
     preset: Annotated[str | None, typer.Option(help="Preset of the controller.")] = None,
     period: Annotated[float, typer.Option(help="Sampling period [s].")] = 0.001,
+    losses: Annotated[
+        list[str] | None,
+        typer.Option("--loss", metavar="R=VALUE", help="Loss of rotor R, 0 to 1; one for each rotor at most."),
+    ] = None,
 ) -> None:
-    """Print hover, linearisation, closed-loop poles, gain and delay margins.
+    """Print hover, what losses leave of it, linearisation, closed-loop poles, gain and delay margins.
 
-    Example: rotorfault trim paper --controller smc
+    Losses matter to the block "attainable hover" alone: whether hover is still possible, whoever controls.
+
+    Example: rotorfault trim paper --controller smc --loss 1=0.4
     """
-    typer.echo(_load("trim").trim_report(vehicle, controller, preset, period).text())
+    loss = _load("attainable_hover").parse_losses(losses or [])
+    typer.echo(_load("trim").trim_report(vehicle, controller, preset, period, loss).text())
 
 
 @app.command()

@@ -2,7 +2,8 @@
 
 What ``rotorfault trim VEHICLE`` prints. Hover is closed form; poles and margins come from `rotorfault.linearisation`
 and `rotorfault.margins`, on the full rigid body without wind and faults, with diagnosis `off` and allocation
-`nominal`: an observer acts on the motion only through its decision.
+`nominal`: an observer acts on the motion only through its decision. A given loss changes nothing in them: it is asked
+of `rotorfault.allocation.hover` alone, whether hover is still possible.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from rotorfault.allocation import ALLOCATORS
 from rotorfault.allocation.mixer import nominal_inverse
 from rotorfault.allocation.protocol import settings_class
+from rotorfault.attainable_hover import Attainable, attainable, attainable_lines
 from rotorfault.autopilot import Autopilot
 from rotorfault.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.config import validate
@@ -63,6 +65,7 @@ class TrimReport(NamedTuple):
     period: float  # s
     numbers: Vehicle
     hover: Hover
+    attainable: Attainable
     linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
     margins: dict[str, Margins]  # per axis of `rotorfault.linearisation.AXES`; empty without linearisation
     warnings: tuple[str, ...]
@@ -70,7 +73,8 @@ class TrimReport(NamedTuple):
     def text(self) -> str:
         """Plain text for a terminal of 100 columns."""
         model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
-        parts = (_hover_lines(self), model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
+        loop = (model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
+        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), *loop)
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
@@ -146,8 +150,9 @@ def trim_report(
     controller: Any = "roismc",
     preset: str | None = None,
     period: float = 0.001,
+    loss: PerRotor | None = None,
 ) -> TrimReport:
-    """Hover, closed-loop poles, gain and delay margins and what to be warned of.
+    """Hover, what of it losses leave, closed-loop poles, gain and delay margins and what to be warned of.
 
     Parameters
     ----------
@@ -158,14 +163,19 @@ def trim_report(
         Preset of a registered controller; its own default if not given.
     period : float, s
         Sampling period.
+    loss : PerRotor, optional
+        Of the rotors, 0 to 1, for `TrimReport.attainable`; all else is with sound rotors.
 
     Raises
     ------
     InputError
-        If the period is not above 0 and up to 1 s, or there is no such vehicle, controller or preset.
+        If the period is not above 0 and up to 1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
+        preset.
     """
     if not 0.0 < period <= 1.0:
         raise InputError(f"period: got {period!r} s; allowed: greater than 0, up to 1")
+    if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
+        raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
@@ -184,7 +194,8 @@ def trim_report(
         warnings += _loop_warnings(linear, found)
     except InputError as error:
         warnings.append(f"no linearisation: {error}")
-    return TrimReport(label, name, period, numbers, hover(numbers), linear, found, tuple(warnings))
+    possible = attainable(numbers, loss)
+    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, found, tuple(warnings))
 
 
 def _loop_warnings(linear: LinearLoop, found: dict[str, Margins]) -> list[str]:
