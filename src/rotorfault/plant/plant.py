@@ -58,7 +58,7 @@ class Truth(NamedTuple):
     ground_force: Scalar  # N, upwards
 
 
-class _Motion(NamedTuple):
+class Motion(NamedTuple):
     """What is integrated."""
 
     time: Scalar  # s
@@ -175,29 +175,47 @@ class Plant:
         self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, dt: Scalar
     ) -> PlantState:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
-        vehicle = parameters.vehicle
-        fault = rotor_faults(self.faults, parameters.faults, time)
+        fault = self.fault(time, parameters)
 
-        def derivative(motion: _Motion) -> _Motion:
-            thrust = delivered_thrust(vehicle, motion.rotors, fault)
-            speeds = true_rotor_speeds(vehicle, motion.rotors, fault)
-            wrench, extra_W = wrench_of(vehicle, thrust), command.direct_acceleration_W
-            if self.ground is not None:
-                contact = self.ground.contact(self.model.observe(motion.body), parameters.ground)
-                wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
-                extra_W = extra_W + contact.force_W / vehicle.mass
-            body_dot = self.model.derivative(
-                motion.body,
-                wrench,
-                extra_W,
-                vehicle,
-                residual_speed(vehicle, speeds),
-                self.wind.at(motion.time, state.air, parameters.wind),
-            )
-            return _Motion(1.0, body_dot, lag_derivative(vehicle, motion.rotors, command.thrust))
+        def derivative(motion: Motion) -> Motion:
+            return self.derivative(motion, command, fault, state.air, parameters)
 
-        after = rk4(derivative, _Motion(time, state.body, state.rotors), dt)
+        after = rk4(derivative, Motion(time, state.body, state.rotors), dt)
         return PlantState(self.model.after_step(after.body), after.rotors, state.air)
+
+    def derivative(
+        self, motion: Motion, command: Command, fault: RotorFault, air: Any, parameters: PlantParameters
+    ) -> Motion:
+        """Time derivative of what is integrated.
+
+        Parameters
+        ----------
+        motion : Motion
+        command : Command
+            Within the rotor limits.
+        fault : RotorFault
+            Held over the integration step.
+        air : record
+            Memory of the wind.
+        parameters : PlantParameters
+        """
+        vehicle = parameters.vehicle
+        thrust = delivered_thrust(vehicle, motion.rotors, fault)
+        speeds = true_rotor_speeds(vehicle, motion.rotors, fault)
+        wrench, extra_W = wrench_of(vehicle, thrust), command.direct_acceleration_W
+        if self.ground is not None:
+            contact = self.ground.contact(self.model.observe(motion.body), parameters.ground)
+            wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
+            extra_W = extra_W + contact.force_W / vehicle.mass
+        body_dot = self.model.derivative(
+            motion.body,
+            wrench,
+            extra_W,
+            vehicle,
+            residual_speed(vehicle, speeds),
+            self.wind.at(motion.time, air, parameters.wind),
+        )
+        return Motion(1.0, body_dot, lag_derivative(vehicle, motion.rotors, command.thrust))
 
     def observe(self, state: PlantState, time: Scalar, parameters: PlantParameters) -> Truth:
         """The truth at a time in s since the start of the flight."""

@@ -1,0 +1,105 @@
+"""The truth that integration errors are measured against: Taylor's method in place of Runge and Kutta's.
+
+The closed loop is flown on Python floats, by the engine `python`; only the motion between two sampling instants is
+integrated otherwise: by the adaptive Taylor series of heyoka [1]_, whose order (about 20) and step follow from a
+tolerance near rounding. What it integrates is `Plant.derivative`, run once on heyoka's expressions, so the equations
+are those of every engine, and the integrator shares nothing with theirs.
+
+Command, faults, memory of the wind and all numbers of the plant enter as values that are held over a sampling period.
+So faults must set in on sampling instants, and motion within a period must be smooth: ground contact is refused.
+
+.. [1] F. Biscani and D. Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial mechanics",
+   MNRAS 504(2), 2021.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, cast, final
+
+from rotorfault.closed_loop import ClosedLoop
+from rotorfault.engine import python
+from rotorfault.engine.batch import Batch, Recording, Watch, no_watch
+from rotorfault.errors import InputError
+from rotorfault.geometry import PerRotor, zeros
+from rotorfault.plant.plant import Motion, Plant, PlantParameters, PlantState
+from rotorfault.records import flatten, leaf_names, unflatten
+from rotorfault.scalar import Scalar
+from rotorfault.signals import Command
+
+TOLERANCE = 1e-16  # relative to the largest coordinate, in each Taylor step
+
+
+def fly_taylor(batch: Batch, watch: Watch = no_watch, tolerance: float = TOLERANCE) -> Recording:
+    """Fly a batch with the motion between sampling instants exact to rounding, or to a tolerance.
+
+    Parameters
+    ----------
+    batch : Batch
+        Its integration step is not used. Some 0.5 ms for each flight and sampling period.
+    watch : Watch
+    tolerance : float
+        Of heyoka: error of one Taylor step, relative to the largest coordinate of the motion or to 1.
+
+    Returns
+    -------
+    Recording
+        As an engine gives it: signals at the sampling instants, state at the end.
+
+    Raises
+    ------
+    InputError
+        If heyoka is not installed, or the flight has ground, on which motion is not smooth.
+    """
+    plant = batch.loop.plant
+    if plant.ground is not None:
+        raise InputError("ground: contact is not smooth, so Taylor series cannot serve; allowed: a flight without it")
+    # A wrapped plant, not a second loop: whatever else happens in a sampling period stays as it is.
+    wrapped = cast(Plant, _TaylorPlant(plant, batch, tolerance))
+    return python.run(batch._replace(loop=ClosedLoop(wrapped, batch.loop.sensors, batch.loop.autopilot)), watch)
+
+
+@final
+class _TaylorPlant:
+    """A plant that moves along Taylor series over each sampling period."""
+
+    def __init__(self, plant: Plant, batch: Batch, tolerance: float) -> None:
+        self._plant = plant
+        hy = _heyoka()
+        state, parameters = batch.state.plant, batch.parameters.plant
+        motion = (state.body, state.rotors)
+        held = (Command(PerRotor.all(0.0), zeros()), plant.fault(0.0, parameters), state.air, parameters)
+        x = hy.make_vars(*(name.replace(".", "_") for name in leaf_names(motion)))
+        body, rotors = unflatten(motion, x)
+        numbers = unflatten(held, [hy.par[i] for i in range(len(flatten(held)))])
+        dot = plant.derivative(Motion(hy.time, body, rotors), *numbers)
+        right = [hy.expression(e) if isinstance(e, float) else e for e in flatten((dot.body, dot.rotors))]
+        self._integrator = hy.taylor_adaptive(list(zip(x, right, strict=True)), [0.0] * len(x), tol=tolerance)
+        self._reached = hy.taylor_outcome.time_limit
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._plant, name)
+
+    def step(
+        self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, period: Scalar
+    ) -> PlantState:
+        """State one sampling period later; see `Plant.step`."""
+        plant, taylor = self._plant, self._integrator
+        held = (plant.limited(command, parameters), plant.fault(time, parameters), state.air, parameters)
+        taylor.pars[:] = flatten(held)[: len(taylor.pars)]  # it keeps them up to the last that the motion needs
+        taylor.state[:] = flatten((state.body, state.rotors))
+        taylor.time = time
+        if taylor.propagate_for(period)[0] != self._reached:
+            raise OverflowError("the motion has no finite numbers")  # a lost flight, for the engine
+        body, rotors = unflatten((state.body, state.rotors), taylor.state.tolist())
+        return PlantState(plant.model.after_step(body), rotors, state.air)
+
+
+def _heyoka() -> Any:
+    try:
+        return importlib.import_module("heyoka")
+    except ImportError:
+        raise InputError(
+            "Taylor series need heyoka, not installed; pip install 'rotorfault[bench]' "
+            "(it exists for Linux on x86-64 and aarch64 only)"
+        ) from None
