@@ -107,8 +107,10 @@ def test_what_cannot_be_counts_is_refused() -> None:
 
 # -------------------------------------------------------------------------------------------------------------- pairs
 
-# Complete response before and after consolidation therapy (Cavo et al. 2012), an example of M. W. Fagerland, S. Lydersen
-# and P. Laake, "Statistical Analysis of Contingency Tables" (2017), chapter 8; results from its package contingencytables.
+# Complete response before and after consolidation therapy (Cavo et al. 2012), an example of M. W. Fagerland, S.
+# Lydersen and P. Laake, "Statistical Analysis of Contingency Tables" (2017), chapter 8; results from the package
+# contingencytables.
+# its R package, contingencytables.
 CAVO = (6, 16, 161)
 
 
