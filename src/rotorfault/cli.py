@@ -328,7 +328,7 @@ def bench(
         study.save(found, as_json)
         typer.echo(f"\nwrote {as_json}")
     if figure is not None:
-        _load("bench.accuracy_figure").save(found, figure)
+        study.draw(found, figure)
         typer.echo(f"wrote {figure}")
 
 

@@ -75,9 +75,8 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     say("latency of a control update")
     found["latency"] = latency.measure(quick)
     found["accuracy"] = None
-    if importlib.util.find_spec("heyoka") is not None and importlib.util.find_spec("rotorfault.bench.accuracy"):
-        say("error against a truth by Taylor's method")
-        found["accuracy"] = importlib.import_module("rotorfault.bench.accuracy").measure(quick)
+    if importlib.util.find_spec("heyoka") is not None:
+        found["accuracy"] = importlib.import_module("rotorfault.bench.accuracy").measure(quick, say)
     found["peers"] = peers.measure(list(peers.PEERS), quick, cores, say) if with_peers else {}
     return found
 
@@ -117,7 +116,9 @@ def text(found: dict[str, Any]) -> str:
     """The numbers as tables to be read."""
     parts = [_machine(found), _flights(found), _limits(found), _sdre(found["sdre"]), _latency(found["latency"])]
     if found["accuracy"] is not None:
-        parts.append(importlib.import_module("rotorfault.bench.accuracy").text(found["accuracy"]))
+        parts.append(_accuracy(found["accuracy"]))
+    else:
+        parts.append("error against cost: not measured, for heyoka is not installed (rotorfault[bench])")
     if found["peers"]:
         parts.append(_peers(found))
     return "\n\n".join(parts)
@@ -202,6 +203,43 @@ def _sdre(sdre: dict[str, Any]) -> str:
 def _latency(found: dict[str, Any]) -> str:
     rows = [(name, f"{part['median_us']:,.1f}", f"{part['p99_9_us']:,.1f}") for name, part in found.items()]
     return _table(("one control update", "median us", "99.9 % us"), rows)
+
+
+def draw(found: dict[str, Any], path: Path) -> None:
+    """Draw error against cost, the peers beside ours where they were measured.
+
+    Raises
+    ------
+    InputError
+        If the errors were not measured.
+    """
+    if found["accuracy"] is None:
+        raise InputError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
+    peers_there = {name: peer for name, peer in found["peers"].items() if "error" not in peer}
+    figure = importlib.import_module("rotorfault.bench.accuracy_figure").draw(found["accuracy"], peers_there or None)
+    write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=150))
+
+
+def _accuracy(found: dict[str, Any]) -> str:
+    parts = []
+    for name, curve in found["curves"].items():
+        rows = [
+            (
+                f"{1e3 * point['step']:g} ms",
+                *(f"{point['flights'][flight]['error_m']:.1e}" for flight in ("sound", "faulty")),
+                f"{point['simulated_s_per_s_per_core']:,.0f}",
+            )
+            for point in curve["points"]
+        ]
+        cheapest = curve["cheapest_step"]
+        parts.append(
+            _table((f"step, {name}", "error m", "with faults m", "simulated s/s per core"), rows)
+            + "\ncheapest step whose error at the end does not matter: "
+            + ("none" if cheapest is None else f"{1e3 * cheapest:g} ms")
+        )
+    return "\n\n".join(
+        [*parts, f"errors below {found['limit_m']:.1e} m do not matter (a thousandth of the yardstick)"]
+    )
 
 
 def _peers(found: dict[str, Any]) -> str:
