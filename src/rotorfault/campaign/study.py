@@ -1,0 +1,265 @@
+"""Studies: which flights a campaign flies, as TOML or from Python, checked once.
+
+Built-in studies are in ``rotorfault/campaign/studies``. A study names axes (a map has two), quantities that are drawn
+anew for each flight, and variants that are compared: every variant flies the same draws with the same seeds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from rotorfault.campaign.axes import AXES, axis
+from rotorfault.campaign.grades import GRADES, SURVIVED
+from rotorfault.campaign.refine import Refinement, looks
+from rotorfault.config import Strict, parse_toml, read_text, refusal, validate
+from rotorfault.errors import InputError
+from rotorfault.registry import unknown
+from rotorfault.scenario import Scenario, load_scenario
+
+MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
+MOST_CELLS = 100_000
+FOLDER = "rotorfault.campaign.studies"
+
+
+class GridAxis(Strict):
+    """One axis of the map: values, or so many evenly spaced between two."""
+
+    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
+    values: tuple[float | str, ...] | None = Field(default=None, description="the values")
+    start: float | None = Field(default=None, description="first value")
+    stop: float | None = Field(default=None, description="last value")
+    count: int | None = Field(default=None, ge=2, le=10_000, description="how many")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> GridAxis:
+        _known(self.name)
+        by_range = (self.start, self.stop, self.count)
+        if self.values is not None:
+            if any(part is not None for part in by_range):
+                raise refusal("values", "cannot stand beside start, stop and count; give one or the other")
+            if not self.values:
+                raise refusal("values", "is empty; give at least one value")
+            if len(set(self.values)) < len(self.values):
+                raise refusal("values", f"has values twice: {list(self.values)}; give each once")
+        elif self.start is None or self.stop is None or self.count is None:
+            raise refusal("values", "is missing; give values, or start, stop and count")
+        elif not self.start < self.stop:
+            raise refusal("stop", f"got {self.stop:g}, an empty range; allowed: above start = {self.start:g}")
+        low, high = axis(self.name).range
+        wrong = [v for v in self.grid if isinstance(v, float) and not low <= v <= high]
+        if wrong:
+            raise refusal("values", f"{self.name} = {wrong[0]:g}; allowed: {low:g} to {high:g}")
+        return self
+
+    @property
+    def grid(self) -> list[float | str]:
+        """The values in order."""
+        if self.values is not None:
+            return list(self.values)
+        start, stop, count = self.start or 0.0, self.stop or 0.0, self.count or 0
+        return [round(float(v), 12) for v in np.linspace(start, stop, count)]
+
+
+class Draw(Strict):
+    """A quantity that is drawn for each flight: uniform between two values, normal, or one of some values."""
+
+    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
+    uniform: tuple[float, float] | None = Field(default=None, description="least and largest value")
+    normal: tuple[float, float] | None = Field(default=None, description="mean and standard deviation")
+    choice: tuple[float | str, ...] | None = Field(default=None, description="values, equally likely")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Draw:
+        _known(self.name)
+        if sum(part is not None for part in (self.uniform, self.normal, self.choice)) != 1:
+            raise refusal("", "give one of uniform, normal and choice")
+        if self.uniform is not None and not self.uniform[0] < self.uniform[1]:
+            raise refusal("uniform", f"got {list(self.uniform)}, an empty range; allowed: [least, largest]")
+        if self.normal is not None and not self.normal[1] > 0.0:
+            raise refusal("normal", f"got {list(self.normal)}; allowed: [mean, deviation above 0]")
+        if self.choice is not None and not self.choice:
+            raise refusal("choice", "is empty; give at least one value")
+        return self
+
+
+class Variant(Strict):
+    """What is compared: a name, and what it changes of the scenario."""
+
+    label: str = Field(min_length=1, max_length=40, description="short name")
+    settings: dict[str, Any] = Field(default={}, description="dotted keys and values")
+
+
+class Refine(Strict):
+    """How many flights a cell gets; see `rotorfault.campaign.refine.Refinement`."""
+
+    initial: int = Field(default=24, ge=1, description="flights of a variant in each cell in the first round")
+    block: int = Field(default=24, ge=1, description="further flights in a round, at least")
+    growth: float = Field(default=0.5, ge=0.0, description="further flights as a share of those there are, at least")
+    width: float = Field(default=0.2, gt=0.0, lt=1.0, description="width of the interval at which a cell is done")
+    level: float = Field(default=0.95, gt=0.0, lt=1.0, description="chance with which an interval covers")
+    most: int = Field(default=240, ge=1, description="flights of a variant in a cell, at most")
+    budget: int | None = Field(default=None, ge=1, description="flights of all variants in all cells, at most")
+
+    def refinement(self) -> Refinement:
+        """The same for the rule."""
+        return Refinement(self.initial, self.block, self.growth, self.width, self.level, self.most, self.budget)
+
+
+class Study(Strict):
+    """Everything that defines a campaign."""
+
+    name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$", description="short name, also of the folder")
+    description: str = Field(default="", description="one line")
+    scenario: str = Field(description="what is flown: name of a scenario, or a TOML file")
+    settings: dict[str, Any] = Field(default={}, description="dotted keys and values for all flights")
+    seed: int = Field(default=0, ge=0, lt=2**40, description="names all random numbers")
+    axis: tuple[GridAxis, ...] = Field(
+        min_length=1, max_length=4, description="[[axis]] tables: the cells of the map"
+    )
+    draw: tuple[Draw, ...] = Field(default=(), description="[[draw]] tables: drawn for each flight")
+    design: Literal["independent", "sobol", "latin"] = Field(
+        default="independent", description="how draws fill their ranges: independent | sobol | latin"
+    )
+    variant: tuple[Variant, ...] = Field(
+        min_length=1, max_length=20, description="[[variant]] tables: what is compared"
+    )
+    refine: Refine = Field(default=Refine(), description="how many flights a cell gets")
+    survived: tuple[str, ...] = Field(default=SURVIVED, min_length=1, description="grades that count as survived")
+
+    @field_validator("survived")
+    @classmethod
+    def _grades(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        for grade in value:
+            if grade not in GRADES:
+                raise ValueError(unknown("grade", grade, list(GRADES)))
+        return value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Study:
+        names = [part.name for part in (*self.axis, *self.draw)]
+        if len(set(names)) < len(names):
+            raise refusal("axis", f"{max(names, key=names.count)} is varied twice; vary it once")
+        labels = [variant.label for variant in self.variant]
+        if len(set(labels)) < len(labels):
+            raise refusal("variant", f"two variants are called '{max(labels, key=labels.count)}'")
+        if self.cells > MOST_CELLS:
+            raise refusal("axis", f"makes {self.cells:.3g} cells; allowed: up to {MOST_CELLS:,}; take coarser axes")
+        try:
+            looks(self.refine.refinement())
+        except InputError as error:
+            raise refusal("refine", str(error)) from None
+        if self.most_flights > MOST_FLIGHTS:
+            raise refusal(
+                "refine", f"up to {self.most_flights:.3g} flights; allowed: up to {MOST_FLIGHTS:.0e}; lower 'most', "
+                "give a 'budget', or take coarser axes",
+            )  # fmt: skip
+        least = self.refine.initial * self.cells * len(self.variant)
+        if self.refine.budget is not None and self.refine.budget < least:
+            raise refusal(
+                "refine.budget", f"got {self.refine.budget}; allowed: at least {least}, the first "
+                f"{self.refine.initial} flights in each of {self.cells} cells for each variant",
+            )  # fmt: skip
+        return self
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Cells along each axis."""
+        return tuple(len(part.grid) for part in self.axis)
+
+    @property
+    def cells(self) -> int:
+        """Cells of the map."""
+        return int(np.prod([float(n) for n in self.shape]))
+
+    @property
+    def most_flights(self) -> float:
+        """Flights of the whole campaign, at most."""
+        return min(float(self.refine.budget or np.inf), float(self.refine.most) * self.cells * len(self.variant))
+
+    @property
+    def digest(self) -> str:
+        """Names all that the study says."""
+        return hashlib.sha256(json.dumps(self.as_tables(), sort_keys=True).encode()).hexdigest()
+
+    def as_tables(self) -> dict[str, Any]:
+        """The study as plain data from which `study_from` makes it again."""
+        data: dict[str, Any] = json.loads(self.model_dump_json(exclude_none=True))
+        return data
+
+    def cell_values(self, cells: NDArray[np.intp]) -> dict[str, NDArray[Any]]:
+        """Values of the axes in some cells, counted row by row."""
+        places = np.unravel_index(cells, self.shape)
+        return {part.name: np.array(part.grid)[place] for part, place in zip(self.axis, places, strict=True)}
+
+    def scenario_of(self, variant: int) -> Scenario:
+        """What a variant flies, before anything varies.
+
+        Raises
+        ------
+        InputError
+            If the scenario cannot be used, or a setting is not allowed.
+        """
+        settings = {**self.settings, **self.variant[variant].settings}
+        try:
+            return load_scenario(self.scenario, settings)
+        except InputError as error:
+            raise InputError(f"variant '{self.variant[variant].label}': {error}") from None
+
+
+def _known(name: str) -> None:
+    try:
+        axis(name)
+    except InputError as error:
+        raise refusal("name", str(error)) from None
+
+
+def study_names() -> list[str]:
+    """Names of the studies that come with rotorfault."""
+    return sorted(e.name.removesuffix(".toml") for e in resources.files(FOLDER).iterdir() if e.name.endswith(".toml"))
+
+
+def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) -> Study:
+    """Load and check a study.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a built-in study, or a path that ends in ``.toml``.
+    changes : dict, optional
+        Top-level keys to be replaced.
+
+    Raises
+    ------
+    InputError
+        If there is no such study, or it is not right; one line with file and key.
+    """
+    if str(name_or_path).endswith(".toml"):
+        where, text = str(name_or_path), read_text(name_or_path)
+    else:
+        name, names = str(name_or_path), study_names()
+        if name not in names:
+            raise InputError(f"{unknown('study', name, names)}; or give a path that ends in .toml")
+        where = f"{name}.toml"
+        text = (resources.files(FOLDER) / where).read_text(encoding="utf-8")
+    tables = parse_toml(text, where) | (changes or {})
+    if str(name_or_path).endswith(".toml") and str(tables.get("scenario", "")).endswith(".toml"):
+        tables["scenario"] = str(Path(name_or_path).parent / tables["scenario"])
+    return study_from(tables, where)
+
+
+def study_from(tables: dict[str, Any], where: str) -> Study:
+    """Check a study given as tables; `where` names their origin in messages."""
+    return validate(Study, tables, where)
+
+
+def unit(name: str) -> str:
+    """Unit of an axis, empty where it has none."""
+    return AXES[name].unit if name in AXES else ""
