@@ -1,0 +1,1 @@
+"""Campaigns: thousands of flights over fault, wind, vehicle and controller."""
