@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 from functools import lru_cache
 from importlib import metadata
+from pathlib import Path
 
 from rotorfault._version import __version__
 
-_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "llvmlite")
+_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "heyoka", "llvmlite")
+
+# Parts of the package that cannot change a flight's numbers.
+_IDLE = ("report", "studies", "cli.py", "catalogue.py", "progress.py", "tuning")
 
 
 def versions() -> dict[str, str]:
     """Versions of rotorfault, Python and the libraries that numbers depend on."""
     return {"rotorfault": __version__, "python": platform.python_version(), **_libraries()}
+
+
+@lru_cache(maxsize=4)
+def source_digest(idle: tuple[str, ...] = _IDLE) -> str:
+    """Digest of all source, and of all data that comes with it, that a flight's numbers depend on.
+
+    Parameters
+    ----------
+    idle : tuple of str, optional
+        Folders and files at the top of the package that cannot change them.
+    """
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml")):
+        place = path.relative_to(root)
+        if place.parts[0] not in idle:
+            digest.update(f"{place.as_posix()}\n".encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 @lru_cache(maxsize=1)

@@ -1,1 +1,1 @@
-"""Campaigns: thousands of flights over a map of cells, and what may be concluded from them."""
+"""Campaigns: thousands of flights over fault, wind, vehicle and controller."""

@@ -11,7 +11,6 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterable
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,9 +21,7 @@ from rotorfault.files import write_atomically
 from rotorfault.flight import fly, load
 from rotorfault.metrics import finite_or_none
 from rotorfault.scenario import Scenario, load_scenario
-
-# Parts of the package that cannot change a flight's numbers.
-_IDLE = ("report", "studies", "cli.py", "catalogue.py", "progress.py", "tuning")
+from rotorfault.versions import source_digest
 
 Measure = Callable[[xr.Dataset], dict[str, Any]]
 
@@ -140,16 +137,5 @@ class Store:
         return self.folder / "runs" / f"{run.id}.json"
 
     def _digest(self, run: Run, scenario: Scenario) -> str:
-        words = [_source_digest(), self._label, str(run.keep), json.dumps(scenario.as_tables(), sort_keys=True)]
+        words = [source_digest(), self._label, str(run.keep), json.dumps(scenario.as_tables(), sort_keys=True)]
         return hashlib.sha256("\n".join(words).encode()).hexdigest()
-
-
-@lru_cache(maxsize=1)
-def _source_digest() -> str:
-    """Digest of all source that a flight's numbers depend on."""
-    root = Path(__file__).parent.parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        if path.relative_to(root).parts[0] not in _IDLE:
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
