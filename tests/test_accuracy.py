@@ -109,6 +109,7 @@ def test_the_truth_is_much_better_than_what_it_judges(measured: dict[str, Any]) 
 
 def test_what_is_reported(measured: dict[str, Any]) -> None:
     assert list(measured["curves"]) == [SAMPLED, HELD]
+    assert 0.0 < measured["cpu_share"] < 1.5
     for name, curve in measured["curves"].items():
         for point in curve["points"]:
             assert point["control_period"] == (point["step"] if name == SAMPLED else PERIOD)

@@ -83,21 +83,20 @@ def measure(quick: bool = False, say: Say = lambda _: None) -> dict[str, Any]:
     Parameters
     ----------
     quick : bool
-        Fewer steps, 1,000 flights instead of 10,000: some seconds instead of minutes.
+        Fewer steps, and 1,000 flights at a time instead of 10,000: half a minute instead of four.
     say : callable
         Is told what is being done, line by line.
 
     Returns
     -------
     dict
-        Lengths in m, times in s. ``batch``: flights that are timed together, on one thread. ``truth``: by how much
-        the truths of the longest period differ between two tolerances, and from Runge-Kutta at 1/64 of the period.
-        ``yardsticks``: by flight and sampling period, at the end and the largest. ``limit_m``, ``largest_limit_m``:
-        errors that do not matter. ``curves`` by name (sampling at each step; sampling every 10 ms): ``points``;
-        ``order``, the slope of the errors by flight, None for fewer than two above rounding; ``cheapest_step``, whose
-        error at the end does not matter, and ``cheapest_step_throughout``, whose largest one does not; None if
-        there is none. A point has what the peers' lists ``accuracy`` have, of the sound flight, and ``flights`` by
-        name.
+        In m and s. ``truth``: by how much those of the longest period differ between two tolerances, and from Runge-
+        Kutta at 1/64 of it. ``yardsticks``: by flight and sampling period. ``limit_m``, ``largest_limit_m``: below
+        them an error at the end, or anywhere, does not matter. ``curves`` by name: ``points``; ``order``, the slope
+        of the errors by flight, None for fewer than two above rounding; ``cheapest_step``, fine enough at the end,
+        and ``cheapest_step_throughout``, None if there is none. A point has what those of the peers have, for the
+        sound flight, and the errors of all ``flights``. ``cpu_share``: the least of processor time over wall time;
+        well below 1, something else ran on the core, and speeds by wall time are too low.
 
     Raises
     ------
@@ -123,6 +122,7 @@ def measure(quick: bool = False, say: Say = lambda _: None) -> dict[str, Any]:
         "yardsticks": yardsticks,
         "limit_m": limit,
         "largest_limit_m": largest,
+        "cpu_share": min(p["simulated_s_per_s_per_core"] / p["simulated_s_per_cpu_s"] for p in points.values()),
         "curves": {name: _curve([points[pair] for pair in pairs[name]], limit, largest) for name in pairs},
     }
 
