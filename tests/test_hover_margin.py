@@ -402,6 +402,7 @@ def test_a_pair_is_two_rotors() -> None:
 
 def flown(fault: dict[str, Any]) -> tuple[str, float]:
     """Outcome and largest yaw in rad, turns counted: the paper's vehicle in calm air, the truth as its diagnosis."""
+    pytest.importorskip("llvmlite")
     flight = rf.fly(
         {
             "name": "hover-loss",
