@@ -10,10 +10,10 @@ from pathlib import Path
 
 from rotorfault._version import __version__
 
-_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "heyoka", "llvmlite")
+_LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "llvmlite")
 
 # Parts of the package that cannot change a flight's numbers.
-_IDLE = ("report", "studies", "cli.py", "catalogue.py", "progress.py", "tuning")
+_IDLE = ("report", "studies", "bench", "cli.py", "catalogue.py", "progress.py", "tuning")
 
 
 def versions() -> dict[str, str]:
