@@ -1,7 +1,8 @@
 """Flying many flights of one scenario: `fly_many` and the `Flights` that it gives back.
 
-Flights are assembled, flown and scored some thousands at a time, so that memory does not grow with their number; only
-the table of their scores does, and what is recorded where recording is asked for.
+All flights are assembled, and so checked, before the first is flown. They are flown and scored some thousands at a
+time: what grows with their number is the numbers in which they differ and the table of their scores, about a kilobyte
+each, and what is recorded where recording is asked for.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Array, Batch
 from rotorfault.errors import InputError
 from rotorfault.flight import Flight, fly, prepare
+from rotorfault.geometry import Vec3
 from rotorfault.progress import Bar
 from rotorfault.registry import unknown
 from rotorfault.scenario import Scenario
 from rotorfault.score_table import ScoreTable, score_table
-from rotorfault.sweep import assemble_group, check_group, checked_columns, groups_of
+from rotorfault.sweep import Group, assemble_group, checked_columns, groups_of
 from rotorfault.telemetry import SIGNAL_NAMES, quantities
 
 if TYPE_CHECKING:
@@ -103,6 +105,7 @@ def fly_many(
     settings: Mapping[str, Any] | None = None,
     record: Sequence[str] = (),
     record_period: float | None = None,
+    within: float | None = None,
     engine: str | None = None,
     threads: int | None = None,
 ) -> Flights:
@@ -121,6 +124,8 @@ def fly_many(
         Signals to be recorded, whole (``position``) or by component (``position.z``).
     record_period : float, optional
         Time between two records in s; the scenario's if not given.
+    within : float, optional
+        Error in m within which an axis counts as settled; 2 % of the step or span if not given.
     engine : str, optional
         simd or numpy or python; the fastest that is installed if not given.
     threads : int, optional
@@ -145,9 +150,6 @@ def fly_many(
     count = len(next(iter(columns.values())))
     rows = _rows(record)
     groups = groups_of(checked, columns)
-    if count > AT_ONCE or len(groups) > 1:  # else it is seen in time
-        for group in groups:
-            check_group(group)
     steps = {group.scenario.steps for group in groups}
     if rows and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
         raise InputError("recorded flights must have one length and one recording period; fly them apart")
@@ -162,25 +164,45 @@ def fly_many(
     tables: list[ScoreTable] = []
     order: list[NDArray[np.intp]] = []
     total = float(sum(len(group.flights) * group.scenario.duration for group in groups))
+    work = _assembled(groups, rows, within)
     with Bar(f"flying {count}", total, "s of flight") as bar:
-        for group in groups:
-            duration = group.scenario.duration
-            for first in range(0, len(group.flights), AT_ONCE):
-                part = slice(first, first + AT_ONCE)
-                batch = assemble_group(group, part)._replace(every=group.scenario.every if rows else 0, wanted=rows)
-                recording = load_engine(name)(batch, _watch(bar, done, batch, duration), threads)
-                if recording.interrupted:
-                    raise KeyboardInterrupt
-                signals[: len(recording.signals), :, group.flights[part]] = recording.signals
-                tables.append(score_table(batch, recording.state))
-                order.append(group.flights[part])
-                flown += recording.flown
-                done += batch.flights * duration
-                bar.update(done)
+        for flights, duration, batch in work:
+            recording = load_engine(name)(batch, _watch(bar, done, batch, duration), threads)
+            if recording.interrupted:
+                raise KeyboardInterrupt
+            signals[: len(recording.signals), :, flights] = recording.signals
+            tables.append(score_table(batch, recording.state))
+            order.append(flights)
+            flown += recording.flown
+            done += batch.flights * duration
+            bar.update(done)
     place = np.argsort(np.concatenate(order))
     table = ScoreTable({key: column[place] for key, column in ScoreTable.joined(tables).columns.items()})
     times: Array = np.arange(records, dtype=np.float64) * (checked.every * checked.period)
     return Flights(checked, columns, table, signals, tuple(SIGNAL_NAMES[i] for i in rows), times, flown)
+
+
+def _assembled(
+    groups: list[Group], rows: tuple[int, ...], within: float | None
+) -> list[tuple[NDArray[np.intp], float, Batch]]:
+    """Which flights, how long, and their batch, some thousands at a time."""
+    found = []
+    count = sum(len(group.flights) for group in groups)
+    with Bar(f"preparing {count}", count, "flights") as bar:
+        for group in groups:
+            for first in range(0, len(group.flights), AT_ONCE):
+                part = slice(first, first + AT_ONCE)
+                batch = assemble_group(group, part)._replace(every=group.scenario.every if rows else 0, wanted=rows)
+                batch = batch if within is None else _settling_within(batch, within)
+                found.append((group.flights[part], group.scenario.duration, batch))
+                bar.update(sum(len(flights) for flights, _, _ in found))
+    return found
+
+
+def _settling_within(batch: Batch, within: float) -> Batch:
+    band = Vec3(within, within, within)
+    scoring = batch.parameters.scoring._replace(settle_band=band)
+    return batch._replace(parameters=batch.parameters._replace(scoring=scoring))
 
 
 def _watch(bar: Bar, before: float, batch: Batch, duration: float) -> Any:

@@ -19,6 +19,7 @@ from pydantic import Field, field_validator, model_validator
 from rotorfault.campaign.axes import AXES, axis
 from rotorfault.campaign.grades import GRADES, SURVIVED
 from rotorfault.campaign.refine import Refinement, looks
+from rotorfault.campaign.studies import FOLDER, study_names
 from rotorfault.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
@@ -26,7 +27,6 @@ from rotorfault.scenario import Scenario, load_scenario
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000
-FOLDER = "rotorfault.campaign.studies"
 
 
 class GridAxis(Strict):
@@ -144,7 +144,7 @@ class Study(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> Study:
-        names = [part.name for part in (*self.axis, *self.draw)]
+        names = [part.name for part in self.axis] + [part.name for part in self.draw]
         if len(set(names)) < len(names):
             raise refusal("axis", f"{max(names, key=names.count)} is varied twice; vary it once")
         labels = [variant.label for variant in self.variant]
@@ -221,11 +221,6 @@ def _known(name: str) -> None:
         raise refusal("name", str(error)) from None
 
 
-def study_names() -> list[str]:
-    """Names of the studies that come with rotorfault."""
-    return sorted(e.name.removesuffix(".toml") for e in resources.files(FOLDER).iterdir() if e.name.endswith(".toml"))
-
-
 def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) -> Study:
     """Load and check a study.
 
@@ -253,6 +248,25 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) 
     if str(name_or_path).endswith(".toml") and str(tables.get("scenario", "")).endswith(".toml"):
         tables["scenario"] = str(Path(name_or_path).parent / tables["scenario"])
     return study_from(tables, where)
+
+
+def changed(study: Study, vehicle: str | None = None, seed: int | None = None, budget: int | None = None) -> Study:
+    """The same study with another vehicle, seed or budget, and a name that says so.
+
+    Raises
+    ------
+    InputError
+        If a value is not allowed.
+    """
+    tables = study.as_tables()
+    if vehicle is not None:
+        tables["settings"] = {**tables.get("settings", {}), "vehicle": vehicle}
+        tables["name"] += f"-{Path(vehicle).stem}"
+    if seed is not None:
+        tables["seed"] = seed
+    if budget is not None:
+        tables["refine"]["budget"] = budget
+    return study_from(tables, study.name)
 
 
 def study_from(tables: dict[str, Any], where: str) -> Study:

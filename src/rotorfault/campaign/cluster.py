@@ -1,0 +1,61 @@
+"""Flying blocks on a Dask cluster: each block is one task, flown anew where a worker dies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, final
+
+import pyarrow as pa
+from distributed import Client, as_completed
+
+from rotorfault.campaign.block import fly_block
+from rotorfault.campaign.plan import Flights
+from rotorfault.campaign.study import Study, study_from
+from rotorfault.errors import InputError
+
+PATIENCE = 10.0  # s to reach the scheduler
+DEATHS = 10  # workers that may die under one block before it counts as the block's fault
+
+
+@final
+class Cluster:
+    """The workers of a running scheduler.
+
+    Parameters
+    ----------
+    address : str
+        Such as ``tcp://localhost:8786``.
+
+    Raises
+    ------
+    InputError
+        If it cannot be reached.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            self._client: Any = Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError, TimeoutError) as error:
+            told = " ".join(str(error).split()) or type(error).__name__
+            raise InputError(
+                f"--scheduler {address}: cannot be reached ({told[:120]}); start one with 'dask scheduler', workers "
+                "with 'dask worker', and give its address"
+            ) from None
+
+    def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Iterator[tuple[int, pa.Table]]:
+        """Fly blocks on all workers."""
+        tables = study.as_tables()
+        futures = {
+            self._client.submit(_fly, tables, *part, pure=False, retries=2, allow_other_workers=True): number
+            for number, part in work
+        }
+        try:
+            for future, table in as_completed(list(futures), with_results=True):  # type: ignore[no-untyped-call]
+                yield futures[future], table
+        finally:
+            self._client.cancel(list(futures))
+
+
+def _fly(tables: dict[str, Any], *part: Any) -> pa.Table:
+    """One block, on one thread: a worker has as many as it was given."""
+    return fly_block(study_from(tables, "study"), Flights(*part), threads=1)

@@ -1,0 +1,48 @@
+"""Flying one flight of a campaign once more: the same numbers, with all records."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotorfault.campaign.axes import columns
+from rotorfault.campaign.block import vary
+from rotorfault.campaign.plan import Flights, identified, seeds
+from rotorfault.campaign.study import Study
+from rotorfault.errors import InputError
+from rotorfault.flight import Flight, fly
+
+
+def settings_of(study: Study, flight: Flights) -> dict[str, Any]:
+    """All that one flight has in place of its variant's scenario."""
+    found = {key: column[0].item() for key, column in columns(vary(study, flight)).items()}
+    return {**found, "seed": int(seeds(study, flight)[0])}
+
+
+def replay(study: Study, identifier: int) -> Flight:
+    """Fly a flight of a campaign once more.
+
+    Raises
+    ------
+    InputError
+        If there is no such flight.
+    """
+    one = identified(study, identifier)
+    return fly(study.scenario_of(int(one.variant[0])), settings=settings_of(study, one))
+
+
+def identifier_of(study: Study, label: str, cell: int, number: int) -> int:
+    """Identifier of a flight by the variant's name, the cell and the number within it.
+
+    Raises
+    ------
+    InputError
+        If there is no such variant, cell or number.
+    """
+    labels = [variant.label for variant in study.variant]
+    if label not in labels:
+        raise InputError(f"there is no variant '{label}' in {study.name}; allowed: {', '.join(labels)}")
+    if not 0 <= cell < study.cells:
+        raise InputError(f"there is no cell {cell} in {study.name}; allowed: 0 to {study.cells - 1}")
+    if not 0 <= number < study.refine.most:
+        raise InputError(f"there is no flight number {number} in a cell; allowed: 0 to {study.refine.most - 1}")
+    return (number * study.cells + cell) * len(labels) + labels.index(label)
