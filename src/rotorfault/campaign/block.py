@@ -65,7 +65,7 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
     order = np.argsort(np.concatenate([which for which, _, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t, _ in parts]).columns.items()})
     found: dict[str, Any] = {
-        "flight": np.arange(flights.count, dtype=np.int64),
+        "flight": np.arange(flights.size, dtype=np.int64),
         "id": identifier(study, flights),
         "variant": np.array([study.variant[v].label for v in flights.variant]),
         "cell": flights.cell,

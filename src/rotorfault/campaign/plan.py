@@ -35,7 +35,7 @@ class Flights(NamedTuple):
     number: NDArray[np.int64]  # within the cell: what is paired between variants
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """How many."""
         return int(self.variant.size)
 
@@ -91,7 +91,7 @@ def identified(study: Study, number: int) -> Flights:
 
 def blocks(flights: Flights) -> Iterator[tuple[int, Flights]]:
     """Units of work: number of the block, and its flights."""
-    for number, first in enumerate(range(0, flights.count, FLIGHTS_IN_BLOCK)):
+    for number, first in enumerate(range(0, flights.size, FLIGHTS_IN_BLOCK)):
         yield number, flights.part(slice(first, first + FLIGHTS_IN_BLOCK))
 
 
@@ -126,7 +126,7 @@ def _independent(study: Study, flights: Flights) -> NDArray[np.float64]:
 
 def _designed(study: Study, flights: Flights) -> NDArray[np.float64]:
     """Numbers that fill the unit cube evenly within each cell, shape (flights, draws)."""
-    shares = np.empty((flights.count, len(study.draw)))
+    shares = np.empty((flights.size, len(study.draw)))
     for cell in np.unique(flights.cell):
         mine = flights.cell == cell
         points = _points(study.design, study.seed, int(cell), len(study.draw), study.refine.most)

@@ -121,13 +121,13 @@ def fly(study: Study, store: Store, crew: Crew, say: Say = lambda _: None) -> Pr
     number = 0
     while True:
         flights = next_round(study, successes, trials)
-        if not flights.count:
+        if not flights.size:
             break
         work = list(blocks(flights))
         everything += [(number, block) for block, _ in work]
         missing = [(block, part) for block, part in work if (number, block) not in done]
-        title, total = f"round {number + 1}", sum(part.count for _, part in missing)
-        sizes = {block: part.count for block, part in missing}
+        title, total = f"round {number + 1}", sum(part.size for _, part in missing)
+        sizes = {block: part.size for block, part in missing}
         with Bar(title, total, "flights") as bar:
             here = 0
             for block, table in crew.fly(study, missing):
