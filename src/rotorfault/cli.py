@@ -312,6 +312,7 @@ def campaign(
         str | None, typer.Option(metavar="tcp://...", help="Fly on the workers of this Dask scheduler.")
     ] = None,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle in place of the study's.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
 ) -> None:
@@ -325,7 +326,7 @@ def campaign(
     if study is None:
         raise InputError("no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list'")
     loaded, run = _load("campaign.study"), _load("campaign.run")
-    checked = loaded.changed(loaded.load_study(study), vehicle, seed, budget)
+    checked = loaded.changed(loaded.load_study(study), vehicle, preset, seed, budget)
     folder = out or Path("campaigns") / checked.name
     run.check(checked)
     crew = run.crew(workers, scheduler)

@@ -22,7 +22,7 @@ from rotorfault.plant.sensors import Normals, Sensors, no_noise
 from rotorfault.plant.wind import FirstNormals, no_first_normals
 from rotorfault.scalar import Scalar
 from rotorfault.scoring import Scores, Scoring, ScoringParameters, unjudged
-from rotorfault.signals import Command, Reference
+from rotorfault.signals import Command, Measurement, Reference
 from rotorfault.telemetry import Signals
 from rotorfault.vehicle import hover_thrust
 
@@ -41,6 +41,7 @@ class LoopState(NamedTuple):
     """State of truth and belief, what has been counted, and the number of steps flown."""
 
     plant: PlantState
+    late: tuple[Measurement, ...]  # measurements on their way to the autopilot, the oldest first
     autopilot: AutopilotMemory
     scores: Scores
     steps: Scalar
@@ -93,26 +94,25 @@ class ClosedLoop:
         truth = self.plant.observe(plant, 0.0, parameters.plant)
         measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
         autopilot = self.autopilot.initial(measurement, drive.reference, parameters.autopilot)
-        return LoopState(plant, autopilot, self.scoring.initial(), 0.0)
+        late = (measurement,) * self.sensors.delay
+        return LoopState(plant, late, autopilot, self.scoring.initial(), 0.0)
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
         """One sampling period: the state after it, and the signals at its beginning."""
-        plant, memory, scores, command, recorded = self.decide(state, drive, parameters)
+        after, command, recorded = self.decide(state, drive, parameters)
         time = state.steps * parameters.period
-        plant = self.plant.step(plant, command, time, parameters.plant, parameters.period)
-        return LoopState(plant, memory, scores, state.steps + 1.0), recorded
+        plant = self.plant.step(after.plant, command, time, parameters.plant, parameters.period)
+        return after._replace(plant=plant), recorded
 
     def decide(
         self, state: LoopState, drive: Drive, parameters: LoopParameters
-    ) -> tuple[PlantState, AutopilotMemory, Scores, Command, Signals]:
-        """The sampling instant alone: all that is held from it on, and the signals.
+    ) -> tuple[LoopState, Command, Signals]:
+        """The sampling instant alone.
 
         Returns
         -------
-        plant : PlantState
-            With the wind of the period that begins; nothing has moved.
-        memory : AutopilotMemory
-        scores : Scores
+        state : LoopState
+            All that is held from it on; the wind is that of the period that begins, and nothing has moved.
         command : Command
             The autopilot's, not yet put within the rotor limits.
         recorded : Signals
@@ -120,7 +120,8 @@ class ClosedLoop:
         time = state.steps * parameters.period
         plant = self.plant.blown(state.plant, drive.gust, parameters.plant, parameters.period)
         truth = self.plant.observe(plant, time, parameters.plant)
-        measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
+        fresh = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
+        measurement, *late = (*state.late, fresh)
         memory, command, report = self.autopilot.step(
             state.autopilot,
             measurement,
@@ -131,7 +132,7 @@ class ClosedLoop:
         )
         recorded = signals(truth, command, report)
         scores = self.scoring.step(state.scores, recorded, parameters.scoring, state.steps, parameters.period)
-        return plant, memory, scores, command, recorded
+        return LoopState(plant, tuple(late), memory, scores, state.steps + 1.0), command, recorded
 
     def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """The true losses, for a diagnosis source that is an oracle; nothing for any other."""

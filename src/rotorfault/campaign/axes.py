@@ -82,6 +82,10 @@ AXES: dict[str, Axis] = {
         },
         (0.0, np.inf),
     ),
+    "sensor_delay": Axis(
+        "", "sampling periods by which measurements come late (sensors noisy)", _key("sensor_delay", "sensors.delay"),
+        (0, 100),
+    ),
     "sampling_period": Axis("s", "sampling period", _key("sampling_period", "period"), (0.0, 1.0)),
     "detection_delay": Axis(
         "s", "delay of the diagnosis (kind delayed)", _key("detection_delay", "diagnosis.delay"), (0.0, np.inf)

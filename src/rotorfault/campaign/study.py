@@ -250,8 +250,11 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) 
     return study_from(tables, where)
 
 
-def changed(study: Study, vehicle: str | None = None, seed: int | None = None, budget: int | None = None) -> Study:
-    """The same study with another vehicle, seed or budget, and a name that says so.
+def changed(
+    study: Study, vehicle: str | None = None, preset: str | None = None, seed: int | None = None,
+    budget: int | None = None,
+) -> Study:  # fmt: skip
+    """The same study with another vehicle, preset of all controllers, seed or budget.
 
     Raises
     ------
@@ -262,6 +265,9 @@ def changed(study: Study, vehicle: str | None = None, seed: int | None = None, b
     if vehicle is not None:
         tables["settings"] = {**tables.get("settings", {}), "vehicle": vehicle}
         tables["name"] += f"-{Path(vehicle).stem}"
+    if preset is not None:
+        for variant in tables["variant"]:
+            variant["settings"] = {**variant.get("settings", {}), "controller.preset": preset}
     if seed is not None:
         tables["seed"] = seed
     if budget is not None:

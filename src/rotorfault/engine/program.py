@@ -22,7 +22,6 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from rotorfault.closed_loop import LoopState
 from rotorfault.engine.batch import Batch, as_drive, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations
 from rotorfault.engine.emit import Emitter, Leaf, merging
@@ -98,9 +97,9 @@ def trace(batch: Batch) -> Traced:
         only = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
         return Traced((only,), 1, layout._replace(signals=len(only.signals)))
 
-    held, memory, scores, command, signals = loop.decide(state, drive, parameters)
+    held, command, signals = loop.decide(state, drive, parameters)
     command = loop.plant.limited(command, parameters.plant)
-    decided = flatten(LoopState(held, memory, scores, state.steps + 1.0))
+    decided = flatten(held)
     kept = flatten((command, state.steps * parameters.period))
     writes = [("%state", row, tape.lift(x)) for row, x in enumerate(decided)]
     writes += [("%kept", row, tape.lift(x)) for row, x in enumerate(kept)]

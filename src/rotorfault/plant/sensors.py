@@ -36,6 +36,10 @@ class Sensors(Protocol):
 
     needs_noise: ClassVar[bool]
 
+    @property
+    def delay(self) -> int:
+        """Sampling periods by which the autopilot gets its measurements late."""
+
     def parameters(self) -> Any:
         """Numbers of the sensors as a record."""
 
@@ -56,6 +60,7 @@ class Ideal:
     """Perfect sensors."""
 
     needs_noise: ClassVar[bool] = False
+    delay = 0
 
     class Settings(Strict):
         """Nothing to choose."""
@@ -84,7 +89,7 @@ class NoisyParameters(NamedTuple):
 @final
 @SENSORS.register("noisy")
 class Noisy:
-    """White Gaussian noise on position, velocity, attitude and rates."""
+    """White Gaussian noise on position, velocity, attitude and rates, and a delay."""
 
     needs_noise: ClassVar[bool] = True
 
@@ -95,9 +100,15 @@ class Noisy:
         velocity: float = Field(0.01, ge=0.0, description="standard deviation of velocity [m/s]")
         attitude: float = Field(0.002, ge=0.0, description="standard deviation of roll, pitch and yaw [rad]")
         rate: float = Field(0.005, ge=0.0, description="standard deviation of the rates [rad/s]")
+        delay: int = Field(0, ge=0, le=100, description="sampling periods by which measurements come late")
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
+
+    @property
+    def delay(self) -> int:
+        """Sampling periods by which measurements come late."""
+        return self.settings.delay
 
     def parameters(self) -> NoisyParameters:
         """The four standard deviations."""
