@@ -8,7 +8,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper test test-numpy lint types benchmarks clean check-python
+.PHONY: help venv paper test test-numpy lint types bench peers maps benchmarks clean check-python
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -55,6 +55,20 @@ lint: .venv/.stamp-develop ## Check style and format with ruff
 
 types: .venv/.stamp-develop ## Check types with mypy
 	.venv/bin/mypy
+
+.venv/.stamp-bench: .venv/.stamp-develop
+	$(PIP) install --quiet -c constraints.txt -e '.[bench]'
+	@touch $@
+
+bench: .venv/.stamp-bench ## Measure speed and accuracy on this machine
+	.venv/bin/rotorfault bench --json results/bench.json --figure results/error-cost.png
+
+peers: .venv/.stamp-bench ## The same beside crazyflow, RotorPy and l2f (installs 8 GB on first use)
+	.venv/bin/rotorfault bench --peers --json results/bench.json --figure results/error-cost.png
+
+maps: .venv/.stamp-fly ## Fly the built-in survival campaigns
+	for study in partial-loss-map two-rotors detection-worth mass-inertia; do \
+	  .venv/bin/rotorfault campaign $$study --out results/campaigns/$$study || exit 1; done
 
 benchmarks: .venv/.stamp-develop ## Run every script in benchmarks/
 	@for script in benchmarks/*.py; do \
