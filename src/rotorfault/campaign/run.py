@@ -148,11 +148,12 @@ def fly(study: Study, store: Store, crew: Crew, say: Say = lambda _: None) -> Pr
 
 
 def _told(study: Study, number: int, successes: Counts, trials: Counts) -> str:
+    # Every cell counts alike: later rounds fly where survival is uncertain, which says nothing about the map.
     shares = ", ".join(
-        f"{variant.label} {100.0 * s / n:.1f} %"
-        for variant, s, n in zip(study.variant, successes.sum(axis=1), trials.sum(axis=1), strict=True)
+        f"{variant.label} {100.0 * share:.1f} %"
+        for variant, share in zip(study.variant, (successes / trials).mean(axis=1), strict=True)
     )
-    return f"round {number}: {trials.sum():,} flights so far; survived: {shares}"
+    return f"round {number}: {trials.sum():,} flights so far; survived over the map: {shares}"
 
 
 def study_in(folder: Path) -> tuple[Study, Store]:
