@@ -14,7 +14,6 @@ from rotorfault.campaign.study import Study, study_from
 from rotorfault.errors import InputError
 
 PATIENCE = 10.0  # s to reach the scheduler
-DEATHS = 10  # workers that may die under one block before it counts as the block's fault
 
 
 @final
@@ -45,12 +44,9 @@ class Cluster:
     def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Iterator[tuple[int, pa.Table]]:
         """Fly blocks on all workers."""
         tables = study.as_tables()
-        futures = {
-            self._client.submit(_fly, tables, *part, pure=False, retries=2, allow_other_workers=True): number
-            for number, part in work
-        }
+        futures = {self._client.submit(_fly, tables, *part, pure=False): number for number, part in work}
         try:
-            for future, table in as_completed(list(futures), with_results=True):  # type: ignore[no-untyped-call]
+            for future, table in as_completed(list(futures), loop=self._client.loop, with_results=True):  # type: ignore[no-untyped-call]
                 yield futures[future], table
         finally:
             self._client.cancel(list(futures))
