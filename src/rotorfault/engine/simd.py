@@ -26,9 +26,10 @@ PATIENCE = 0.1  # s between two looks at progress
 
 def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:
     """Fly a batch on vector lanes; see `rotorfault.engine.batch.Engine`."""
-    flight = _Common(batch)
+    threads = threads or os.cpu_count() or 1
+    flight = _Common(batch, threads)
     blocks = [flight.block(first) for first in range(0, batch.flights, flight.block_size)]
-    threads = min(threads or os.cpu_count() or 1, len(blocks))
+    threads = min(threads, len(blocks))
     interrupted = False
     try:
         if threads == 1:
@@ -67,7 +68,7 @@ def _run_threads(flight: _Common, blocks: list[_Block], watch: Watch, threads: i
 class _Common:
     """What all blocks of a batch share."""
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: Batch, threads: int) -> None:
         machines = Machines(batch)
         self.batch = batch
         self.quiet = machines.get(with_signals=False) if batch.every != 1 else None
@@ -75,7 +76,8 @@ class _Common:
         any_machine = self.quiet or self.recording
         assert any_machine is not None
         self.layout, self.lanes = any_machine.layout, any_machine.lanes
-        self.block_size = GROUPS * self.lanes
+        groups = -(-batch.flights // self.lanes)
+        self.block_size = min(GROUPS, -(-groups // threads)) * self.lanes  # work for all, if there is enough
         self.records = Records(batch)
         self.state = np.empty((self.layout.state, batch.flights))
         self.reference = np.ascontiguousarray(batch.reference)
