@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rotorfault import cli_campaign
 from rotorfault._version import __version__
 from rotorfault.errors import InputError
 
@@ -296,83 +297,6 @@ def tune(
 
 
 @app.command()
-def campaign(
-    study: Annotated[
-        str | None, typer.Argument(help="Built-in study (see 'rotorfault list studies') or a TOML file.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in the folder.")] = False,
-    repair: Annotated[
-        bool, typer.Option("--repair", help="Go on; move damaged parts aside and fly them anew.")
-    ] = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="Threads; one per core if not given.")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="tcp://...", help="Fly on the workers of this Dask scheduler.")
-    ] = None,
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle in place of the study's.")] = None,
-    preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
-    budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
-) -> None:
-    """Fly a survival campaign: thousands of flights over a map of faults and wind, most where survival is uncertain.
-
-    Writes study.json, parts/*.parquet while it flies, and flights.parquet at the end. Ctrl-C, or a kill, loses the
-    blocks in flight only; --resume completes it to the same table.
-
-    Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
-    """
-    if study is None:
-        raise InputError("no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list'")
-    loaded, run = _load("campaign.study"), _load("campaign.run")
-    checked = loaded.changed(loaded.load_study(study), vehicle, preset, seed, budget)
-    folder = out or Path("campaigns") / checked.name
-    run.check(checked)
-    crew = run.crew(workers, scheduler)
-    with run.open_store(checked, folder, resume, repair) as store:
-        for damage in store.repaired:
-            typer.echo(f"moved aside: {damage.name} ({damage.reason})", err=True)
-        try:
-            done = run.fly(checked, store, crew, lambda line: typer.echo(line, err=True))
-        except KeyboardInterrupt:
-            typer.echo(f"interrupted; what is done is kept, go on with --resume --out {folder}", err=True)
-            raise typer.Exit(130) from None
-    typer.echo(
-        f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {folder}/flights.parquet"
-    )
-
-
-@app.command()
-def replay(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a campaign.")],
-    flight: Annotated[int | None, typer.Option(metavar="ID", help="Column 'id' of the campaign's table.")] = None,
-    cell: Annotated[int | None, typer.Option(help="Or a cell of the map (column 'cell'), with --variant.")] = None,
-    variant: Annotated[str | None, typer.Option(help="Variant, with --cell.")] = None,
-    number: Annotated[int, typer.Option(help="Which flight of the cell.")] = 0,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for results; DIR-replays/ID if not given.")
-    ] = None,
-) -> None:
-    """Fly one flight of a campaign once more, exactly, with all records and figures.
-
-    Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
-    """
-    study, _ = _load("campaign.run").study_in(folder)
-    again = _load("campaign.replay")
-    if (flight is None) == (cell is None):
-        raise InputError("give the flight by --flight ID, or by --cell and --variant")
-    if flight is None:
-        if variant is None:
-            raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
-        flight = again.identifier_of(study, variant, cell, number)
-    target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
-    _load("files").output_folder(target)
-    _finish(again.replay(study, flight), target, figures)
-
-
-@app.command()
 def bench(
     with_peers: Annotated[
         bool, typer.Option("--peers", help="Also crazyflow, RotorPy and l2f, each installed on first use (8 GB).")
@@ -407,6 +331,9 @@ def bench(
     if figure is not None:
         study.draw(found, figure)
         typer.echo(f"wrote {figure}")
+
+
+cli_campaign.add_to(app, _load, _finish)
 
 
 def main() -> None:
