@@ -17,9 +17,11 @@ from rotorfault.engine.structure import structure
 from rotorfault.geometry import PerRotor, Vec3, zeros
 from rotorfault.plant import PLANTS, WINDS, Ground, Plant
 from rotorfault.plant.plant import PlantState
+from rotorfault.records import unflatten
 from rotorfault.scenario import scenario_from
+from rotorfault.scoring import KINDS, Scoring, ScoringParameters
 from rotorfault.signals import Command, Measurement, Reference, healthy
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.telemetry import SIGNAL_NAMES, _template
 from rotorfault.vehicle import Vehicle
 from rotorfault.vehicle_file import load_vehicle
 
@@ -278,14 +280,24 @@ def test_a_touch_is_gentle_or_a_crash() -> None:
     assert first(landing_stage=0.0) == 5, "without a landing, below the ground is a crash"
 
 
+def ends_at(stage: Any, force: Any) -> tuple[int, int] | None:
+    """Step at which scoring ends a flight of 200 periods of 10 ms, and how; None if it does not."""
+    scoring, zero = Scoring(ground=True), Vec3(0.0, 0.0, 0.0)
+    scores, still = scoring.initial(), unflatten(_template(), [0.0] * len(SIGNAL_NAMES))
+    parameters = ScoringParameters(zero, zero, 100.0, -1.0, 1e3, 0.0)
+    for k, (at, push) in enumerate(zip(np.broadcast_to(stage, 200), np.broadcast_to(force, 200), strict=True)):
+        seen = still._replace(landing_stage=float(at), ground_force=float(push))
+        scores = scoring.step(scores, seen, parameters, float(k), 0.01)
+    return None if scores.over == 0.0 else (int(scores.end), int(scores.over))
+
+
 def test_rest_ends_a_flight_after_half_a_second_on_end() -> None:
-    times = np.arange(200) * 0.01
-    stopped = np.where(times >= 0.2 - 1e-9, 2.0, 1.0)
-    assert touchdown.rested(rows(200, landing_stage=stopped, ground_force=1.0), times) == 70
-    hop = np.where(np.arange(200) == 40, 0.0, 1.0)
-    assert touchdown.rested(rows(200, landing_stage=stopped, ground_force=hop), times) == 91
-    assert touchdown.rested(rows(200, landing_stage=stopped), times) is None
-    assert touchdown.rested(rows(200, landing_stage=1.0, ground_force=1.0), times) is None
+    landed = KINDS.index("landed")
+    stopped = np.where(np.arange(200) >= 20, 2.0, 1.0)
+    assert ends_at(stopped, 1.0) == (70, landed)
+    assert ends_at(stopped, np.where(np.arange(200) == 40, 0.0, 1.0)) == (91, landed)
+    assert ends_at(stopped, 0.0) is None
+    assert ends_at(1.0, 1.0) is None
 
 
 # --------------------------------------------------------------------------------------------------------- flights

@@ -1,4 +1,4 @@
-"""How a landing went: gentle or a crash, when it was over, and its numbers.
+"""How a landing went: gentle or a crash, and its numbers.
 
 All from the records of the flight. Touch-down is the first record with ground force while a landing is under way; its
 speeds and tilt are those of the record before, the last one in the air. See `rotorfault.metrics` for the definitions.
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array
 from rotorfault.flight_data import Records
-from rotorfault.scoring import REST, SLIDE_MAX, SPEED_MAX, TILT_MAX
+from rotorfault.scoring import SLIDE_MAX, SPEED_MAX, TILT_MAX
 from rotorfault.telemetry import SIGNAL_NAMES
 
 Data = TypeVar("Data", bound=Records)
@@ -38,23 +38,6 @@ def crashed(signals: Array, ground: float) -> NDArray[np.bool_]:
     gentle &= np.concatenate([gentle[:1], gentle[:-1]])
     gentle &= _tilt(signals) <= TILT_MAX
     return np.asarray(np.where(landing, _touching(signals) & ~gentle, ~above))
-
-
-def at_rest(signals: Array) -> NDArray[np.bool_]:
-    """Whether in each record the vehicle stands on the ground with its rotors stopped, shape (records,)."""
-    stopped: NDArray[np.bool_] = signals[:, _ROW["landing_stage"]] > 1.5
-    return stopped & _touching(signals)
-
-
-def rested(signals: Array, times: Array) -> int | None:
-    """First record at which the vehicle has been at rest for `REST` seconds on end, or None."""
-    rest = at_rest(signals)
-    if not rest.any():
-        return None
-    since = np.maximum.accumulate(np.where(rest, -1, np.arange(len(rest))))
-    start = times[np.minimum(since + 1, len(times) - 1)]
-    done = np.flatnonzero(rest & (times - start >= REST - 1e-9))
-    return int(done[0]) if len(done) else None
 
 
 def touch_record(data: Records) -> int | None:
