@@ -19,7 +19,7 @@ from rotorfault.plant import PLANTS, WINDS, Ground, Plant
 from rotorfault.plant.plant import PlantState
 from rotorfault.records import unflatten
 from rotorfault.scenario import scenario_from
-from rotorfault.scoring import KINDS, Scoring, ScoringParameters
+from rotorfault.scoring import KINDS, REST, Scoring, ScoringParameters
 from rotorfault.signals import Command, Measurement, Reference, healthy
 from rotorfault.telemetry import SIGNAL_NAMES, _template
 from rotorfault.vehicle import Vehicle
@@ -311,7 +311,7 @@ def check_gentle(flight: rf.Flight) -> dict[str, Any]:
     assert landing["fault_time"] == pytest.approx(1.8)
     assert 1.8 < landing["confirmed_time"] < 2.0
     assert landing["touch_down_time"] < landing["rotors_stopped_time"] < landing["touch_down_time"] + 1.0
-    assert flight.outcome.time == pytest.approx(landing["rotors_stopped_time"] + touchdown.REST, abs=0.01)
+    assert flight.outcome.time == pytest.approx(landing["rotors_stopped_time"] + REST, abs=0.01)
     assert 0.3 < landing["speed"] < 0.5
     assert landing["horizontal_speed"] < 0.05
     assert landing["tilt"] < 0.2
