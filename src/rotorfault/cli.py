@@ -315,14 +315,25 @@ def campaign(
     preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
+    report_only: Annotated[
+        bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
+    ] = False,
 ) -> None:
     """Fly a survival campaign: thousands of flights over a map of faults and wind, most where survival is uncertain.
 
-    Writes study.json, parts/*.parquet while it flies, and flights.parquet at the end. Ctrl-C, or a kill, loses the
-    blocks in flight only; --resume completes it to the same table.
+    Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
+    Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
 
     Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
     """
+    if report_only:
+        if out is None:
+            raise InputError("--report-only needs the folder of a campaign; give it with --out")
+        if study is not None or resume or repair or not report:
+            raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
+        _report(out)
+        return
     if study is None:
         raise InputError("no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list'")
     loaded, run = _load("campaign.study"), _load("campaign.run")
@@ -341,6 +352,17 @@ def campaign(
     typer.echo(
         f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {folder}/flights.parquet"
     )
+    if report:
+        _report(folder)
+
+
+def _report(folder: Path) -> None:
+    """Pictures and page of a campaign, finished or not."""
+    study, store = _load("campaign.run").study_in(folder)
+    with _load("progress").Busy("making the report"):
+        paths = _load("campaign.report").write(study, store.table(), folder, store.identity.versions)
+    pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
+    typer.echo(f"report in {paths[0]}; pictures in {folder / 'figures'}: {pictures}, each as SVG too")
 
 
 @app.command()
