@@ -11,7 +11,19 @@ import pytest
 
 import rotorfault
 
-HEAVY = {"cma", "h5netcdf", "jinja2", "matplotlib", "pandas", "polars", "pyarrow", "rich", "scipy", "xarray"}
+HEAVY = {
+    "cma",
+    "h5netcdf",
+    "jinja2",
+    "matplotlib",
+    "pandas",
+    "plotly",
+    "polars",
+    "pyarrow",
+    "rich",
+    "scipy",
+    "xarray",
+}
 
 
 def loaded(code: str, cwd: Path | None = None) -> set[str]:
