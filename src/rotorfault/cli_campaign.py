@@ -43,14 +43,27 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
         preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
         seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
         budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
+        report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
+        report_only: Annotated[
+            bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
+        ] = False,
     ) -> None:
         """Fly a survival campaign: thousands of flights over a map, most of them where survival is uncertain.
 
-        Writes study.json, parts/*.parquet while it flies, and flights.parquet at the end. Ctrl-C, or a kill, loses
-        the blocks in flight only; --resume completes it to the same table.
+        Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
+        Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
 
         Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
         """
+        if report_only:
+            if out is None:
+                raise InputError("--report-only needs the folder of a campaign; give it with --out")
+            if study is not None or resume or repair or not report:
+                raise InputError(
+                    "--report-only makes the report of what is in --out and flies nothing; give it alone"
+                )
+            _report(out, load)
+            return
         if study is None:
             raise InputError(
                 "no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list'"
@@ -72,6 +85,9 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
             f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; "
             f"table in {folder / 'flights.parquet'}"
         )
+
+        if report:
+            _report(folder, load)
 
     @app.command()
     def replay(
@@ -102,3 +118,12 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
         target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
         load("files").output_folder(target)
         finish(again.replay(study, flight), target, figures)
+
+
+def _report(folder: Path, load: Callable[[str], Any]) -> None:
+    """Pictures and page of a campaign, finished or not."""
+    study, store = load("campaign.run").study_in(folder)
+    with load("progress").Busy("making the report"):
+        paths = load("campaign.report").write(study, store.table(), folder, store.identity.versions)
+    pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
+    typer.echo(f"report in {paths[0]}; pictures in {folder / 'figures'}: {pictures}, each as SVG too")
