@@ -281,23 +281,26 @@ def _curve(maps: Maps, lines: Sequence[Array], name: str, style: Spec) -> list[S
 
 def _bars(maps: Maps, found: Crossings, name: str) -> list[Spec]:
     """Intervals of crossings; where open, no bar."""
-    if not len(found.points):
-        return []
     x, y = maps.views[:2]
-    at = np.column_stack([x.drawn(found.points[:, 0]), y.drawn(found.points[:, 1])])
-    view, middle = maps.views[found.along], at[:, found.along]
-    ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower, found.upper)]
-    bar = {
-        "type": "data", "symmetric": False, "color": GREY_BAR, "thickness": 1, "width": 2,
-        "arrayminus": (middle - ends[0]).round(5).tolist(), "array": (ends[1] - middle).round(5).tolist(),
-    }  # fmt: skip
-    return [
-        {
-            "type": "scatter", "mode": "markers", "x": at[:, 0].round(5).tolist(), "y": at[:, 1].round(5).tolist(),
-            "marker": {"color": BLACK, "size": 3}, "error_x" if found.along == 0 else "error_y": bar,
-            "hoverinfo": "skip", "name": f"interval of {name}", "showlegend": False,
-        }
-    ]  # fmt: skip
+    traces = []
+    for axis, view in enumerate((x, y)):
+        mine = found.along == axis
+        at = np.column_stack([x.drawn(found.points[mine, 0]), y.drawn(found.points[mine, 1])])
+        middle = at[:, axis]
+        ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower[mine], found.upper[mine])]
+        bar = {
+            "type": "data", "symmetric": False, "color": GREY_BAR, "thickness": 1, "width": 2,
+            "arrayminus": (middle - ends[0]).round(5).tolist(), "array": (ends[1] - middle).round(5).tolist(),
+        }  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers",
+                "x": at[:, 0].round(5).tolist(), "y": at[:, 1].round(5).tolist(),
+                "marker": {"color": BLACK, "size": 3}, "error_x" if axis == 0 else "error_y": bar,
+                "hoverinfo": "skip", "name": f"interval of {name}", "showlegend": False,
+            }
+        )  # fmt: skip
+    return [trace for trace in traces if trace["x"]]
 
 
 def _nullable(values: Array) -> list[Any]:

@@ -46,11 +46,12 @@ class Crossings(NamedTuple):
         Between cells straight, as `rotorfault.campaign.boundary` has it; none on maps with names on an axis, and
         for a study with one axis.
     points : ndarray, shape (crossings, 2)
-        On lines of the grid.
+        On lines of the grid; where survival changes along both axes alike, on both.
     lower, upper : ndarray, shape (crossings,)
-        Interval along the axis `along`; NaN where it is open.
-    along : int
-        0 or 1: the axis along which survival crosses the level on most lines.
+        Interval along the crossing's axis; NaN where it is open.
+    along : ndarray of int, shape (crossings,)
+        Axis, 0 or 1, along which survival crosses the level: of the two the one on which it changes faster there, so
+        that intervals lie across the boundary and not beside it.
     """
 
     level: float
@@ -58,7 +59,7 @@ class Crossings(NamedTuple):
     points: Array
     lower: Array
     upper: Array
-    along: int
+    along: NDArray[np.int64]
 
 
 class Edges(NamedTuple):
@@ -97,39 +98,49 @@ def crossings(maps: Maps, variant: VariantMap, part: Slice, level: float) -> Cro
             return _nothing(level)
         row = Interval(bounds.lower[None], bounds.upper[None])
         found = boundary(survived[None], flights[None], x.positions, level, axis=1, interval=row)
-        return _listed(found, np.array([level]), 0, level, [])
-    views = maps.views[:2]
-    candidates = [
-        boundary(survived, flights, view.positions, level, axis=axis, interval=bounds)
-        for axis, view in enumerate(views)
-        if view.numeric
-    ]
-    if not candidates:
+        return Crossings(level, [], *_listed(found, np.array([level]), 0))
+    views, survival = maps.views[:2], part.of(variant.survival)
+    parts = []
+    for axis, view in enumerate(views):
+        if view.numeric:
+            found = boundary(survived, flights, view.positions, level, axis=axis, interval=bounds)
+            points, lower, upper, along = _listed(found, views[1 - axis].positions, axis)
+            kept = _faster(views, survival, points, axis)
+            parts.append((points[kept], lower[kept], upper[kept], along[kept]))
+    if not parts:
         return _nothing(level)
-    axes = [axis for axis, view in enumerate(views) if view.numeric]
-    # Across the boundary, not beside it: the axis on which more of the lines cross.
-    crossed = [_share_that_cross(found) for found in candidates]
-    best = int(np.argmax(crossed))
-    other = views[1 - axes[best]].positions
     drawn = all(view.numeric and len(view.values) > 1 for view in views)
     x_positions, y_positions = (view.positions for view in views)
-    lines = _contours(x_positions, y_positions, part.of(variant.survival), level) if drawn else []
-    return _listed(candidates[best], other, axes[best], level, lines)
+    lines = _contours(x_positions, y_positions, survival, level) if drawn else []
+    return Crossings(level, lines, *(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def _share_that_cross(found: Boundary) -> float:
-    return float(np.isfinite(found.position).any(axis=1).mean()) if found.position.size else 0.0
+def _faster(views: tuple[View, ...], survival: Array, points: Array, axis: int) -> NDArray[np.bool_]:
+    """Which crossings along an axis lie across the boundary: survival changes there no faster along the other one."""
+    other = views[1 - axis]
+    if not other.numeric or len(other.values) < 2:
+        return np.ones(len(points), dtype=bool)
+    beside = np.nan_to_num(np.gradient(survival, axis=1 - axis))
+    below = (
+        np.searchsorted(views[axis].positions, points[:, axis], side="left").clip(1, len(views[axis].values) - 1) - 1
+    )
+    line = np.searchsorted(other.positions, points[:, 1 - axis])
+    low, high = ((at, line) if axis == 0 else (line, at) for at in (below, below + 1))
+    step = np.abs(survival[high] - survival[low])
+    kept = step >= 0.5 * np.abs(beside[low] + beside[high])
+    return np.asarray(kept)
 
 
-def _listed(found: Boundary, other: Array, along: int, level: float, lines: list[Array]) -> Crossings:
+def _listed(found: Boundary, other: Array, axis: int) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+    """Points, intervals and axes of crossings."""
     line, crossing = np.nonzero(np.isfinite(found.position))
     points = np.empty((len(line), 2))
-    points[:, along], points[:, 1 - along] = found.position[line, crossing], other[line]
-    return Crossings(level, lines, points, found.lower[line, crossing], found.upper[line, crossing], along)
+    points[:, axis], points[:, 1 - axis] = found.position[line, crossing], other[line]
+    return points, found.lower[line, crossing], found.upper[line, crossing], np.full(len(line), axis)
 
 
 def _nothing(level: float) -> Crossings:
-    return Crossings(level, [], np.empty((0, 2)), np.empty(0), np.empty(0), 0)
+    return Crossings(level, [], np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
 
 
 def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:

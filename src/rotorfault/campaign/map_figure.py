@@ -174,16 +174,16 @@ def _boundary(axes: Axes, maps: Maps, found: Crossings, seen: dict[str, Artist])
         _line(axes, x.drawn(line[:, 0]), y.drawn(line[:, 1]), style, 3.0)
     if not len(found.points):
         return
-    view = maps.views[found.along]
     at = np.column_stack([x.drawn(found.points[:, 0]), y.drawn(found.points[:, 1])])
-    middle = at[:, found.along]
-    ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower, found.upper)]
-    bar = np.abs(np.array(ends) - middle)
-    across, upwards = (bar if found.along == axis else None for axis in (0, 1))
-    axes.errorbar(
-        at[:, 0], at[:, 1], xerr=across, yerr=upwards, fmt="none",
-        ecolor=style["color"], elinewidth=0.8, capsize=1.6, capthick=0.8, zorder=3.2,
-    )  # fmt: skip
+    for axis, view in enumerate((x, y)):
+        mine = found.along == axis
+        middle = at[mine, axis]
+        ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower[mine], found.upper[mine])]
+        bar = np.abs(np.array(ends) - middle)
+        axes.errorbar(
+            at[mine, 0], at[mine, 1], xerr=bar if axis == 0 else None, yerr=bar if axis == 1 else None, fmt="none",
+            ecolor=style["color"], elinewidth=0.8, capsize=1.6, capthick=0.8, zorder=3.2,
+        )  # fmt: skip
     if not found.lines:  # crossings of lines that are no neighbours
         style = {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 3.0, "zorder": 3.3}
         style["markerfacecolor"] = BLACK if found.level == LEVELS[0] else "white"
