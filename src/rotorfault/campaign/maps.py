@@ -5,7 +5,8 @@ So an unfinished campaign has maps too, and every interval holds (`rotorfault.ca
 
 Means and shares over several cells give each cell the same weight, however many flights it has: there are most where
 survival is uncertain. Totals over the whole map take the first round's flights of each cell, whose number no result
-has decided; their intervals put the cells' together as Zou and Donner do (`rotorfault.campaign.paired`).
+has decided, in the cells that all variants have flown; their intervals put those of the cells together as Zou and
+Donner do (`rotorfault.campaign.paired`).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from rotorfault.campaign.paired import (
     mcnemar_anytime,
     overall_difference,
 )
+from rotorfault.campaign.plan import next_round
 from rotorfault.campaign.refine import intervals, looks
 from rotorfault.campaign.statistics import Array, Interval, holm, wilson
 from rotorfault.campaign.study import Study
@@ -119,6 +121,8 @@ class Maps(NamedTuple):
     pairings: tuple[Pairing, ...]
     flights: int  # that count
     left_out: int  # of rounds that are not complete
+    compared: int  # cells that all variants have flown: those of the totals
+    complete: bool  # whether sampling asks for no further flight
 
 
 class _Flown(NamedTuple):
@@ -153,16 +157,21 @@ def maps(study: Study, table: pa.Table) -> Maps:
     flights = sum(len(each.place) for each in flown)
     if not flights:
         raise InputError(f"{study.name}: no cell has a whole round of flights yet; go on with --resume")
+    # Totals of variants over different cells could not be compared.
+    common = np.all([np.bincount(each.place, minlength=study.cells) > 0 for each in flown], axis=0)
+    variants = tuple(_variant(study, k, each, cell, common) for k, each in enumerate(flown))
     pairs = list(itertools.combinations(range(len(flown)), 2))
     if len(pairs) > MOST_PAIRS:
         pairs = [(0, k) for k in range(1, len(flown))]
     return Maps(
         study=study,
         views=views,
-        variants=tuple(_variant(study, k, each, cell) for k, each in enumerate(flown)),
-        pairings=tuple(_pairing(study, a, b, flown) for a, b in pairs),
+        variants=variants,
+        pairings=tuple(_pairing(study, a, b, flown, common) for a, b in pairs),
         flights=flights,
         left_out=table.num_rows - flights,
+        compared=int(common.sum()),
+        complete=_complete(study, variants),
     )
 
 
@@ -186,7 +195,14 @@ def _flown(study: Study, columns: dict[str, NDArray[Any]], label: str, place_of:
     return _Flown(place_of[cell[keep]], number[keep], {name: each[mine] for name, each in columns.items()})
 
 
-def _variant(study: Study, k: int, flown: _Flown, cell: Counts) -> VariantMap:
+def _complete(study: Study, variants: tuple[VariantMap, ...]) -> bool:
+    counts = np.zeros((2, len(variants), study.cells), dtype=np.int64)
+    for k, variant in enumerate(variants):
+        counts[:, k, variant.cell.ravel()] = variant.survived.ravel(), variant.flights.ravel()
+    return not next_round(study, counts[0], counts[1]).size
+
+
+def _variant(study: Study, k: int, flown: _Flown, cell: Counts, common: NDArray[np.bool_]) -> VariantMap:
     shape, count = cell.shape, cell.size
     survived = flown.columns["survived"].astype(bool)
     trials, successes = np.bincount(flown.place, minlength=count), np.bincount(flown.place[survived], minlength=count)
@@ -222,7 +238,7 @@ def _variant(study: Study, k: int, flown: _Flown, cell: Counts) -> VariantMap:
         altitude=quantiles[2],
         first_lost=lost.reshape(shape),
         possible=None if found is None else Limits(*(each.reshape(shape) for each in found)),
-        total=_total(study, flown, survived),
+        total=_total(study, flown, survived, common),
         shares=_shares(by_grade.reshape(len(GRADES), rows, -1)),
         recovery_along=quantiles[1],
         altitude_along=quantiles[3],
@@ -280,9 +296,9 @@ def weighted_quantiles(values: Array, weights: Array, groups: Counts, count: int
     return found
 
 
-def _total(study: Study, flown: _Flown, survived: NDArray[np.bool_]) -> Difference:
-    """Survival over the whole map on the first round's flights."""
-    first = flown.number < study.refine.initial
+def _total(study: Study, flown: _Flown, survived: NDArray[np.bool_], common: NDArray[np.bool_]) -> Difference:
+    """Survival over the cells that all variants have flown, on the first round's flights."""
+    first = (flown.number < study.refine.initial) & common[flown.place]
     trials = np.bincount(flown.place[first], minlength=study.cells)
     successes = np.bincount(flown.place[first & survived], minlength=study.cells)
     some = trials > 0
@@ -300,7 +316,7 @@ def _together(estimate: Array, bounds: Interval) -> Difference:
     return Difference(middle, middle - down, middle + up)
 
 
-def _pairing(study: Study, first: int, second: int, flown: list[_Flown]) -> Pairing:
+def _pairing(study: Study, first: int, second: int, flown: list[_Flown], common: NDArray[np.bool_]) -> Pairing:
     a, b = flown[first], flown[second]
     keys = [each.place * study.refine.most + each.number for each in (a, b)]
     _, at_a, at_b = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
@@ -316,7 +332,10 @@ def _pairing(study: Study, first: int, second: int, flown: list[_Flown]) -> Pair
         )
 
     shape = tuple(study.shape)
-    everything, early = counted(np.ones(len(place), dtype=bool)), counted(number < study.refine.initial)
+    everything, early = (
+        counted(np.ones(len(place), dtype=bool)),
+        counted((number < study.refine.initial) & common[place]),
+    )
     difference = difference_anytime(*everything, study.refine.level)
     p_value = holm(np.where(everything.pairs > 0, mcnemar_anytime(*everything[:2]), np.nan))
     with np.errstate(invalid="ignore"):
