@@ -16,6 +16,7 @@ from figure_checks import check_nothing_covered
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
+from rotorfault import versions
 from rotorfault.allocation.hover import hover_margin
 from rotorfault.campaign import charts, curves, figures, report
 from rotorfault.campaign.grades import GRADES
@@ -33,6 +34,7 @@ from rotorfault.vehicle_file import load_vehicle
 LOSS = {"name": "loss", "values": [0.0, 0.2, 0.4, 0.6, 0.8]}
 WIND = {"name": "wind_speed", "values": [0.0, 4.0, 8.0]}
 VARIANTS = [{"label": "one"}, {"label": "two"}]
+TWO_FAULTS = {"fault": [{"kind": "step", "rotor": r, "time": 1.0, "loss": 0.3} for r in (1, 3)]}
 FIRST = 8
 
 Share = Callable[[str, tuple[int, ...]], float]
@@ -137,8 +139,25 @@ def test_only_whole_rounds_in_a_row_count() -> None:
     np.testing.assert_array_equal(found.variants[0].flights, [FIRST, FIRST, FIRST, 0, FIRST])
     assert np.isnan(found.variants[0].survival[3])
     assert found.left_out == 2 * (3 + FIRST - 1)
+    assert not found.complete
     with pytest.raises(InputError, match="no cell has a whole round"):
         maps(study, table.slice(0, FIRST - 1))
+
+
+def test_totals_compare_the_same_cells() -> None:
+    study = study_of([LOSS])
+    table = table_of(study, lambda _, place: 1.0 - 0.5 * (place[0] % 2))
+    missing = (table["variant"].to_numpy(zero_copy_only=False) == "two") & (table["cell"].to_numpy() == 1)
+    found = maps(study, table.filter(~missing))
+    assert found.compared == 4
+    assert [float(variant.total.estimate) for variant in found.variants] == [0.875, 0.875]
+    assert float(found.pairings[0].total.estimate) == 0.0
+
+
+def test_a_campaign_is_complete_when_sampling_asks_for_no_more(plane: Maps) -> None:
+    assert not plane.complete  # cells with half of their flights lost are not narrow yet
+    study = study_of([LOSS], refine={"initial": FIRST, "block": FIRST, "most": FIRST})
+    assert maps(study, table_of(study, falling)).complete
 
 
 def test_the_first_lost_flight_is_named(plane: Maps) -> None:
@@ -177,7 +196,7 @@ def test_boundaries_go_where_they_must(plane: Maps) -> None:
     assert count == 1
     half = curves.crossings(plane, plane.variants[1], part, 0.5)
     # Survival 1, 0.5, 0 at losses 0.2, 0.4, 0.6, in every wind.
-    assert half.along == 0
+    assert (half.along == 0).all()
     np.testing.assert_allclose(half.points, [[0.4, 0.0], [0.4, 4.0], [0.4, 8.0]])
     np.testing.assert_allclose(half.lines[0][:, 0], 0.4)
     high = curves.crossings(plane, plane.variants[1], part, 0.99)
@@ -195,8 +214,19 @@ def test_boundaries_are_looked_for_across_them() -> None:
     study = study_of([LOSS, WIND])
     found = maps(study, table_of(study, lambda _, place: 1.0 - 0.5 * place[1]))
     across = curves.crossings(found, found.variants[0], curves.slices(found)[0][0], 0.75)
-    assert across.along == 1
+    assert (across.along == 1).all()
+    assert len(across.along) == 5
     np.testing.assert_allclose(across.points[:, 1], 2.0)
+
+
+def test_boundaries_with_a_corner_have_intervals_on_both_sides_of_it() -> None:
+    study = study_of([LOSS, {"name": "second_loss", "values": LOSS["values"]}], settings=TWO_FAULTS)
+    found = maps(study, table_of(study, lambda _, place: float(max(place) < 3)))
+    half = curves.crossings(found, found.variants[0], curves.slices(found)[0][0], 0.5)
+    for axis in (0, 1):
+        np.testing.assert_allclose(
+            half.points[half.along == axis], np.roll([[0.5, 0], [0.5, 0.2], [0.5, 0.4]], axis, 1)
+        )
 
 
 def test_attainable_cells_are_those_of_the_hover_margin(plane: Maps) -> None:
@@ -211,8 +241,7 @@ def test_attainable_cells_are_those_of_the_hover_margin(plane: Maps) -> None:
 
 
 def test_attainable_knows_mismatch_second_faults_and_onset() -> None:
-    faults = [{"kind": "step", "rotor": r, "time": 1.0, "loss": 0.3} for r in (1, 3)]
-    settings = {"fault": faults, "mismatch.mass": 1.1}
+    settings = {**TWO_FAULTS, "mismatch.mass": 1.1}
     study = study_of([{"name": "second_loss", "values": [0.0, 0.5]}], settings=settings)
     vehicle = load_vehicle("paper").vehicle
     heavy = vehicle._replace(mass=1.1 * vehicle.mass)
@@ -404,3 +433,12 @@ def test_campaign_makes_its_report(tmp_path: Path) -> None:
     assert "survival.png" in done.stdout
     assert (folder / "figures" / "recovery.svg").is_file()
     assert "Campaign tiny" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_pictures_decide_no_numbers() -> None:
+    """A change to a picture must not keep anybody from going on with a campaign; a misspelt file would."""
+    root = Path(versions.__file__).parent
+    for place in versions._IDLE:
+        assert (root / place).exists(), place
+    pictures = {path.name for path in (root / "campaign").glob("*.py") if "matplotlib" in path.read_text()}
+    assert pictures <= {place.removeprefix("campaign/") for place in versions._IDLE}
