@@ -18,7 +18,7 @@ _PICTURES = (
     "page", "report",
 )  # fmt: skip
 _IDLE = (
-    "report", "studies", "bench", "cli.py", "catalogue.py", "progress.py", "tuning",
+    "report", "studies", "bench", "cli.py", "cli_campaign.py", "catalogue.py", "progress.py", "tuning",
     *(f"campaign/{name}.py" for name in _PICTURES),
 )  # fmt: skip
 
