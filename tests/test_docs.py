@@ -17,6 +17,7 @@ import pytest
 import typer.main
 
 import rotorfault as rf
+from rotorfault.campaign.study import study_from
 from rotorfault.catalogue import REGISTRIES, entries
 from rotorfault.cli import app
 from rotorfault.config import parse_toml
@@ -270,7 +271,9 @@ def test_scenarios_and_parts_in_toml_are_valid() -> None:
     assert found
     for path, body in found:
         tables = parse_toml(body, name_of(path))
-        if "duration" in tables:
+        if "axis" in tables:
+            study_from(tables, name_of(path))
+        elif "duration" in tables:
             scenario_from(tables, name_of(path))
         else:
             prepare("paper-set-point", settings=tables)
