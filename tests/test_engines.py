@@ -392,9 +392,12 @@ def test_an_interrupted_flight_keeps_what_it_has(engine: str) -> None:
     def watch(done: int) -> bool:
         raise KeyboardInterrupt
 
-    recording = run(short(duration=0.005 * 2 * CHUNK), engine, watch)
+    batch = assemble(short(duration=0.005 * 2 * CHUNK))
+    recording = run(batch, engine, watch)
     assert recording.interrupted
     assert len(recording.steps) == len(recording.signals) == CHUNK
+    names = leaf_names(batch.state)
+    assert recording.state[names.index("steps"), 0] == recording.state[names.index("scores.seen"), 0] == CHUNK
 
 
 @every_engine

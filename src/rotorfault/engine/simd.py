@@ -37,11 +37,14 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
                 for _ in block.chunks():
                     if watch(flight.done // batch.flights):
                         flight.stop.set()
+                block.close()
         else:
             _run_threads(flight, blocks, watch, threads)
     except KeyboardInterrupt:
         flight.stop.set()
         interrupted = True
+    for block in blocks:
+        block.close()
     if flight.stop.is_set():
         flight.records.until(min(block.reached for block in blocks))
     if interrupted and batch.every == 0:
@@ -79,7 +82,7 @@ class _Common:
         groups = -(-batch.flights // self.lanes)
         self.block_size = min(GROUPS, -(-groups // threads)) * self.lanes  # work for all, if there is enough
         self.records = Records(batch)
-        self.state = np.empty((self.layout.state, batch.flights))
+        self.state = np.zeros((self.layout.state, batch.flights))
         self.reference = np.ascontiguousarray(batch.reference)
         self.stop = threading.Event()
         self._lock, self.done = threading.Lock(), 0
@@ -100,11 +103,14 @@ class _Block:
 
     def __init__(self, common: _Common, flights: NDArray[np.intp]) -> None:
         self._common, self._flights, self.reached = common, flights, 0
+        self._state: Array | None = None
+        self._prepared: dict[int, Array] = {}  # by machine
 
     def fly(self) -> None:
         """From the first step to the last."""
         for _ in self.chunks():
             pass
+        self.close()  # at once: only results are held until all blocks are done
 
     def chunks(self) -> Iterator[None]:
         """Fly chunk by chunk."""
@@ -120,15 +126,20 @@ class _Block:
             self._drop()
             yield
             if not len(self._flights):
+                self.reached = batch.steps  # nothing is left that could be recorded
                 break
-        else:
+
+    def close(self) -> None:
+        """Keep the state of the flights as far as they got."""
+        if self._state is not None and len(self._flights):
             self._keep(self._flights, ungrouped(self._state, len(self._flights)))
-            self.reached = batch.steps
-            return
-        if len(self._flights):
-            self._keep(self._flights, ungrouped(self._state, len(self._flights)))
-        else:
-            self.reached = batch.steps  # nothing is left that could be recorded
+        self._state, self._prepared = None, {}
+
+    @property
+    def _flying(self) -> Array:
+        """State of the block, shape (groups, rows, lanes)."""
+        assert self._state is not None
+        return self._state
 
     def _begin(self) -> None:
         common, batch = self._common, self._common.batch
@@ -166,22 +177,22 @@ class _Block:
     def _record(self, first: int, shared: Array) -> None:
         machine = self._common.recording
         assert machine is not None
-        out = aligned((len(self._state), len(shared), machine.layout.signals, machine.lanes))
+        out = aligned((len(self._flying), len(shared), machine.layout.signals, machine.lanes))
         self._call(machine, shared, out)
         by_flight = out.transpose(1, 2, 0, 3).reshape(len(shared), machine.layout.signals, -1)
         self._common.records.add(first, by_flight[:, :, : len(self._flights)], self._flights)
 
     def _call(self, machine: Machine, shared: Array, out: Array | None = None) -> None:
-        machine.fly(self._state, self._prepared[id(machine)], shared, out)
+        machine.fly(self._flying, self._prepared[id(machine)], shared, out)
 
     def _drop(self) -> None:
         """Let flights that are over make room, where that saves a group of lanes."""
         lanes, count = self._common.lanes, len(self._flights)
-        over = self._state[:, self._common.layout.over].reshape(-1)[:count] != 0.0
+        over = self._flying[:, self._common.layout.over].reshape(-1)[:count] != 0.0
         left = int(count - over.sum())
-        if -(-left // lanes) == len(self._state) and left:
+        if -(-left // lanes) == len(self._flying) and left:
             return
-        rows = ungrouped(self._state, count)
+        rows = ungrouped(self._flying, count)
         self._keep(self._flights[over], rows[:, over])
         flying = np.flatnonzero(~over)
         self._flights = self._flights[flying]
