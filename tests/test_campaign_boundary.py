@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.campaign.boundary import boundary
-from rotorfault.campaign.refine import Refinement, further_flights, intervals
-from rotorfault.campaign.statistics import Interval, clopper_pearson
+from rotorfault.campaigns.boundary import boundary
+from rotorfault.campaigns.refine import Refinement, further_flights, intervals
+from rotorfault.campaigns.statistics import Interval, clopper_pearson
 from rotorfault.errors import InputError
 
 WIND = np.linspace(0.0, 10.0, 21)  # m/s, an axis that is not of whole numbers

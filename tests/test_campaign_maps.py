@@ -18,14 +18,14 @@ from typer.testing import CliRunner
 
 from rotorfault import versions
 from rotorfault.allocation.hover import hover_margin
-from rotorfault.campaign import charts, curves, figures, report
-from rotorfault.campaign.grades import GRADES
-from rotorfault.campaign.limits import limits
-from rotorfault.campaign.maps import Maps, maps
-from rotorfault.campaign.paired import difference_anytime, mcnemar_anytime, overall_difference
-from rotorfault.campaign.refine import Refinement, intervals
-from rotorfault.campaign.statistics import holm
-from rotorfault.campaign.study import Study, study_from
+from rotorfault.campaigns import charts, curves, figures, report
+from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.limits import limits
+from rotorfault.campaigns.maps import Maps, maps
+from rotorfault.campaigns.paired import difference_anytime, mcnemar_anytime, overall_difference
+from rotorfault.campaigns.refine import Refinement, intervals
+from rotorfault.campaigns.statistics import holm
+from rotorfault.campaigns.study import Study, study_from
 from rotorfault.cli import app
 from rotorfault.errors import InputError
 from rotorfault.geometry import PerRotor, Vec3
@@ -440,5 +440,5 @@ def test_pictures_decide_no_numbers() -> None:
     root = Path(versions.__file__).parent
     for place in versions._IDLE:
         assert (root / place).exists(), place
-    pictures = {path.name for path in (root / "campaign").glob("*.py") if "matplotlib" in path.read_text()}
-    assert pictures <= {place.removeprefix("campaign/") for place in versions._IDLE}
+    pictures = {path.name for path in (root / "campaigns").glob("*.py") if "matplotlib" in path.read_text()}
+    assert pictures <= {place.removeprefix("campaigns/") for place in versions._IDLE}

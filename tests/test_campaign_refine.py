@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from rotorfault.campaign.refine import Refinement, finished, further_flights, intervals, looks
-from rotorfault.campaign.sampling_plan import Plan, sampling_plan
-from rotorfault.campaign.statistics import clopper_pearson, wilson
+from rotorfault.campaigns.refine import Refinement, finished, further_flights, intervals, looks
+from rotorfault.campaigns.sampling_plan import Plan, sampling_plan
+from rotorfault.campaigns.statistics import clopper_pearson, wilson
 from rotorfault.errors import InputError
 
 Counts = NDArray[np.int64]

@@ -16,12 +16,12 @@ import pytest
 from campaign_studies import TINY
 
 import rotorfault
-from rotorfault.campaign import run
-from rotorfault.campaign.block import fly_block
-from rotorfault.campaign.plan import Flights, drawn, identified, identifier, next_round, seeds
-from rotorfault.campaign.replay import identifier_of, replay
-from rotorfault.campaign.studies import study_names
-from rotorfault.campaign.study import Study, changed, load_study, study_from
+from rotorfault.campaigns import run
+from rotorfault.campaigns.block import fly_block
+from rotorfault.campaigns.plan import Flights, drawn, identified, identifier, next_round, seeds
+from rotorfault.campaigns.replay import identifier_of, replay
+from rotorfault.campaigns.studies import study_names
+from rotorfault.campaigns.study import Study, changed, load_study, study_from
 from rotorfault.engine import have_simd
 from rotorfault.errors import InputError
 
@@ -41,14 +41,14 @@ def complete(study: Study, folder: Path, crew: Any = None, resume: bool = False)
 
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rotorfault.campaign.plan.FLIGHTS_IN_BLOCK", 10)
+    monkeypatch.setattr("rotorfault.campaigns.plan.FLIGHTS_IN_BLOCK", 10)
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The table of the tiny study in blocks of ten."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rotorfault.campaign.plan.FLIGHTS_IN_BLOCK", 10)
+        patch.setattr("rotorfault.campaigns.plan.FLIGHTS_IN_BLOCK", 10)
         return complete(tiny(), tmp_path_factory.mktemp("undisturbed") / "campaign")
 
 
@@ -88,10 +88,10 @@ def test_an_interrupted_campaign_goes_on(tmp_path: Path, undisturbed: bytes) -> 
 def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, undisturbed: bytes) -> None:
     """Three kills at random moments, without a chance to tidy up."""
     code = (
-        "import sys, rotorfault.campaign.plan as plan\n"
+        "import sys, rotorfault.campaigns.plan as plan\n"
         "plan.FLIGHTS_IN_BLOCK = 10\n"
-        "from rotorfault.campaign import run\n"
-        "from rotorfault.campaign.study import study_from\n"
+        "from rotorfault.campaigns import run\n"
+        "from rotorfault.campaigns.study import study_from\n"
         "from pathlib import Path\n"
         f"study = study_from({TINY!r}, 'test')\n"
         "folder = Path(sys.argv[1])\n"
@@ -229,3 +229,19 @@ def test_built_in_studies_can_be_flown(name: str, vehicle: str | None) -> None:
     table = fly_block(short, flights)
     assert table.num_rows == 2
     assert set(table["variant"].to_pylist()) == {"roismc", "smc"}
+
+
+def test_from_python(tmp_path: Path) -> None:
+    told: list[str] = []
+    found = rotorfault.campaign(TINY, tmp_path / "campaign", seed=3, say=told.append)
+    assert told
+    assert "tiny" in repr(found)
+    table = found.table()
+    row = table.to_pylist()[7]
+    assert found.replay(row["id"]).summary()["cost"] == pytest.approx(row["cost"], rel=1e-12)
+    again = rotorfault.Campaign(tmp_path / "campaign")
+    assert again.table().equals(table)
+    assert again.study.seed == 3
+    assert int(again.maps().flights) == table.num_rows
+    with pytest.raises(InputError, match="allowed: a name, a path, tables or a Study"):
+        rotorfault.campaign(3)  # type: ignore[arg-type]

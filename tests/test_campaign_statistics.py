@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest, ttest_rel
 
-from rotorfault.campaign import paired, statistics
-from rotorfault.campaign.statistics import INTERVALS, clopper_pearson, holm, proportion_interval, quantiles, wilson
+from rotorfault.campaigns import paired, statistics
+from rotorfault.campaigns.statistics import INTERVALS, clopper_pearson, holm, proportion_interval, quantiles, wilson
 from rotorfault.errors import InputError
 
 METHODS = sorted(INTERVALS)

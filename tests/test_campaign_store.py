@@ -23,11 +23,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from rotorfault.campaign import identity as identity_module
-from rotorfault.campaign import parquet
-from rotorfault.campaign.lock import Lock
-from rotorfault.campaign.parquet import content_digest
-from rotorfault.campaign.store import Key, Store
+from rotorfault.campaigns import identity as identity_module
+from rotorfault.campaigns import parquet
+from rotorfault.campaigns.lock import Lock
+from rotorfault.campaigns.parquet import content_digest
+from rotorfault.campaigns.store import Key, Store
 from rotorfault.errors import InputError
 from rotorfault.versions import source_digest
 
@@ -698,7 +698,7 @@ def test_a_disk_without_locks_is_said(folder: Path, monkeypatch: pytest.MonkeyPa
     def none(*_: object) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
-    monkeypatch.setattr("rotorfault.campaign.lock._take", none)
+    monkeypatch.setattr("rotorfault.campaigns.lock._take", none)
     with pytest.raises(
         InputError, match=r"lock: cannot be locked \(No locks available\); give an --out on a disk of"
     ):

@@ -17,7 +17,7 @@ import pytest
 import typer.main
 
 import rotorfault as rf
-from rotorfault.campaign.study import study_from
+from rotorfault.campaigns.study import study_from
 from rotorfault.catalogue import REGISTRIES, entries
 from rotorfault.cli import app
 from rotorfault.config import parse_toml

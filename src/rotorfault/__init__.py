@@ -19,6 +19,7 @@ from rotorfault._version import __version__
 
 if TYPE_CHECKING:
     from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.control.protocol import CONTROLLERS, ControlInputs, Controller, ControlOutput, no_telemetry
     from rotorfault.errors import InputError
     from rotorfault.flight import Flight, fly, fly_all, load, repeat
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "CONTROLLERS": "control.protocol",
+    "Campaign": "campaigns.api",
     "ControlInputs": "control.protocol",
     "ControlOutput": "control.protocol",
     "Controller": "control.protocol",
@@ -50,6 +52,7 @@ _HOME = {
     "Wrench": "signals",
     "critical_loss": "allocation.hover",
     "critical_pair": "allocation.hover",
+    "campaign": "campaigns.api",
     "fly": "flight",
     "fly_all": "flight",
     "fly_many": "many",
@@ -68,6 +71,7 @@ _HOME = {
 
 __all__ = [
     "CONTROLLERS",
+    "Campaign",
     "ControlInputs",
     "ControlOutput",
     "Controller",
@@ -84,6 +88,7 @@ __all__ = [
     "Vehicle",
     "Wrench",
     "__version__",
+    "campaign",
     "critical_loss",
     "critical_pair",
     "fly",

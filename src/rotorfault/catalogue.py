@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorfault.allocation import ALLOCATORS
-from rotorfault.campaign.studies import study_names
+from rotorfault.campaigns.studies import study_names
 from rotorfault.config import parse_toml, read_text
 from rotorfault.control import CONTROLLERS, RESPONSES
 from rotorfault.diagnosis import DIAGNOSES
@@ -47,7 +47,7 @@ def entries() -> dict[str, dict[str, str]]:
     for name in found["controllers"]:
         known = presets(name)
         found["controllers"][name] += f" Presets: {', '.join(known)}." if known else ""
-    found["studies"] = {name: _description("rotorfault.campaign.studies", name) for name in study_names()}
+    found["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
     found["engines"] = {name: about for name, (_, about) in ENGINES.items()}
     return found
 

@@ -62,32 +62,22 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
                 raise InputError(
                     "--report-only makes the report of what is in --out and flies nothing; give it alone"
                 )
-            _report(out, load)
+            _report(load("campaigns.api").Campaign(out), load)
             return
         if study is None:
             raise InputError(
-                "no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list'"
+                "no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list studies'"
             )
-        loaded, run = load("campaign.study"), load("campaign.run")
-        checked = loaded.changed(loaded.load_study(study), vehicle, preset, seed, budget)
-        folder = out or Path("campaigns") / checked.name
-        run.check(checked)
-        crew = run.crew(workers, scheduler)
-        with run.open_store(checked, folder, resume, repair) as store:
-            for damage in store.repaired:
-                typer.echo(f"moved aside: {damage.name} ({damage.reason})", err=True)
-            try:
-                done = run.fly(checked, store, crew, lambda line: typer.echo(line, err=True))
-            except KeyboardInterrupt:
-                typer.echo(f"interrupted; what is done is kept, go on with --resume --out {folder}", err=True)
-                raise typer.Exit(130) from None
-        typer.echo(
-            f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; "
-            f"table in {folder / 'flights.parquet'}"
-        )
-
+        try:
+            done = load("campaigns.api").campaign(
+                study, out, resume=resume, repair=repair, vehicle=vehicle, preset=preset, seed=seed, budget=budget,
+                workers=workers, scheduler=scheduler, say=lambda line: typer.echo(line, err=True),
+            )  # fmt: skip
+        except KeyboardInterrupt:
+            typer.echo("interrupted; what is done is kept, go on with the same command and --resume", err=True)
+            raise typer.Exit(130) from None
         if report:
-            _report(folder, load)
+            _report(done, load)
 
     @app.command()
     def replay(
@@ -107,8 +97,8 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
 
         Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
         """
-        study, _ = load("campaign.run").study_in(folder)
-        again = load("campaign.replay")
+        campaign = load("campaigns.api").Campaign(folder)
+        study, again = campaign.study, load("campaigns.replay")
         if (flight is None) == (cell is None):
             raise InputError("give the flight by --flight ID, or by --cell and --variant")
         if flight is None:
@@ -117,13 +107,12 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
             flight = again.identifier_of(study, variant, cell, number)
         target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
         load("files").output_folder(target)
-        finish(again.replay(study, flight), target, figures)
+        finish(campaign.replay(flight), target, figures)
 
 
-def _report(folder: Path, load: Callable[[str], Any]) -> None:
+def _report(campaign: Any, load: Callable[[str], Any]) -> None:
     """Pictures and page of a campaign, finished or not."""
-    study, store = load("campaign.run").study_in(folder)
     with load("progress").Busy("making the report"):
-        paths = load("campaign.report").write(study, store.table(), folder, store.identity.versions)
+        paths = campaign.report()
     pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
-    typer.echo(f"report in {paths[0]}; pictures in {folder / 'figures'}: {pictures}, each as SVG too")
+    typer.echo(f"report in {paths[0]}; pictures in {paths[1].parent}: {pictures}, each as SVG too")

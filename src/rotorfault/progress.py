@@ -9,13 +9,17 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
 
 PATIENCE = 2.0  # s before anything is shown
 
 
+_outermost: Bar | None = None
+"""The bar that may be shown: a long computation may be part of a longer one, which has a bar already."""
+
+
 class Bar:
-    """A progress bar that appears only when it is needed, and only on a terminal.
+    """A progress bar that appears only when it is needed, only on a terminal, and not within another.
 
     Parameters
     ----------
@@ -27,28 +31,35 @@ class Bar:
 
     def __init__(self, title: str, total: float, unit: str) -> None:
         self._progress: Progress | None = None
-        self._task = None
+        self._task: TaskID | None = None
         self._start = time.monotonic()
         self.title, self.total, self.unit = title, total, unit
 
     def __enter__(self) -> Bar:
+        global _outermost
+        _outermost = _outermost or self
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
+        global _outermost
+        if _outermost is self:
+            _outermost = None
         if self._progress is not None:
             self._progress.stop()
 
-    def update(self, done: float) -> None:
-        """Show how much is done, in `unit`."""
-        if self._progress is None:
-            if time.monotonic() - self._start < PATIENCE or not sys.stderr.isatty():
+    def update(self, done: float, note: str = "") -> None:
+        """Show how much is done, in `unit`, how fast, and a note."""
+        elapsed = time.monotonic() - self._start
+        if self._progress is None or self._task is None:
+            if elapsed < PATIENCE or _outermost is not self or not sys.stderr.isatty():
                 return
             self._progress = _progress(self.unit)
             self._progress.start()
-            self._task = self._progress.add_task(self.title, total=self.total)  # type: ignore[assignment]
-        self._progress.update(self._task, completed=done)  # type: ignore[arg-type]
+            self._task = self._progress.add_task(self.title, total=self.total, rate="", note="")
+        rate = f"{done / max(elapsed, 1e-3):,.4g} {self.unit}/s"
+        self._progress.update(self._task, completed=done, rate=rate, note=note)
 
 
 def _progress(unit: str) -> Progress:
@@ -58,14 +69,16 @@ def _progress(unit: str) -> Progress:
         rich.TextColumn("{task.description}"),
         rich.BarColumn(),
         rich.TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
+        rich.TextColumn("{task.fields[rate]}"),
         rich.TimeRemainingColumn(),
+        rich.TextColumn("{task.fields[note]}"),
         console=console.Console(stderr=True),
         transient=True,
     )
 
 
 class Busy:
-    """A line that says what is going on, for as long as it does; only on a terminal.
+    """A line that says what is going on, for as long as it does; only on a terminal without a bar.
 
     Parameters
     ----------
@@ -86,5 +99,5 @@ class Busy:
 
     @staticmethod
     def _show(line: str) -> None:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and _outermost is None:
             print(line, end="\r", file=sys.stderr, flush=True)

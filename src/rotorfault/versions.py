@@ -19,7 +19,7 @@ _PICTURES = (
 )  # fmt: skip
 _IDLE = (
     "report", "studies", "bench", "cli.py", "cli_campaign.py", "catalogue.py", "progress.py", "tuning",
-    *(f"campaign/{name}.py" for name in _PICTURES),
+    *(f"campaigns/{name}.py" for name in _PICTURES),
 )  # fmt: skip
 
 

@@ -8,9 +8,9 @@ from typing import Any, final
 import pyarrow as pa
 from distributed import Client, as_completed
 
-from rotorfault.campaign.block import fly_block
-from rotorfault.campaign.plan import Flights
-from rotorfault.campaign.study import Study, study_from
+from rotorfault.campaigns.block import fly_block
+from rotorfault.campaigns.plan import Flights
+from rotorfault.campaigns.study import Study, study_from
 from rotorfault.errors import InputError
 
 PATIENCE = 10.0  # s to reach the scheduler

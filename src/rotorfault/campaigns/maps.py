@@ -1,12 +1,12 @@
 """Numbers of a campaign's maps, from its table: survival, grades, recovery, altitude lost, differences, limits.
 
 Only whole rounds of a cell count: the flights 0, 1, 2, ... of a cell up to a number at which sampling looks at it.
-So an unfinished campaign has maps too, and every interval holds (`rotorfault.campaign.refine`).
+So an unfinished campaign has maps too, and every interval holds (`rotorfault.campaigns.refine`).
 
 Means and shares over several cells give each cell the same weight, however many flights it has: there are most where
 survival is uncertain. Totals over the whole map take the first round's flights of each cell, whose number no result
 has decided, in the cells that all variants have flown; their intervals put those of the cells together as Zou and
-Donner do (`rotorfault.campaign.paired`).
+Donner do (`rotorfault.campaigns.paired`).
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rotorfault.campaign.axes import AXES
-from rotorfault.campaign.grades import GRADES
-from rotorfault.campaign.limits import Limits, limits
-from rotorfault.campaign.paired import (
+from rotorfault.campaigns.axes import AXES
+from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.limits import Limits, limits
+from rotorfault.campaigns.paired import (
     Difference,
     PairCounts,
     difference_anytime,
     mcnemar_anytime,
     overall_difference,
 )
-from rotorfault.campaign.plan import next_round
-from rotorfault.campaign.refine import intervals, looks
-from rotorfault.campaign.statistics import Array, Interval, holm, wilson
-from rotorfault.campaign.study import Study
+from rotorfault.campaigns.plan import next_round
+from rotorfault.campaigns.refine import intervals, looks
+from rotorfault.campaigns.statistics import Array, Interval, holm, wilson
+from rotorfault.campaigns.study import Study
 from rotorfault.errors import InputError
 
 Counts = NDArray[np.int64]
@@ -140,7 +140,7 @@ def maps(study: Study, table: pa.Table) -> Maps:
     ----------
     study : Study
     table : pyarrow.Table
-        Flights, as `rotorfault.campaign.block.fly_block` makes them; all of a campaign, or those there are so far.
+        Flights, as `rotorfault.campaigns.block.fly_block` makes them; all of a campaign, or those there are so far.
 
     Raises
     ------

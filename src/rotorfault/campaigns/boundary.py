@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import isotonic_regression
 
-from rotorfault.campaign.statistics import Array, Interval, check_level, clopper_pearson
+from rotorfault.campaigns.statistics import Array, Interval, check_level, clopper_pearson
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
 
@@ -70,7 +70,7 @@ def boundary(
     axis : {-1, 0, 1}, optional
         Along which to look: 1 or -1 gives the crossings in each row, 0 those in each column.
     interval : Interval, optional
-        Of each cell, such as `rotorfault.campaign.refine.intervals` has it; that of Clopper and Pearson with 95 % if
+        Of each cell, such as `rotorfault.campaigns.refine.intervals` has it; that of Clopper and Pearson with 95 % if
         not given, which is for numbers of flights that were fixed beforehand.
     monotone : {"rising", "falling"}, optional
         What survival is known to do along the axis.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotorfault.campaign.axes import columns
-from rotorfault.campaign.block import vary
-from rotorfault.campaign.plan import Flights, identified, seeds
-from rotorfault.campaign.study import Study
+from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.block import vary
+from rotorfault.campaigns.plan import Flights, identified, seeds
+from rotorfault.campaigns.study import Study
 from rotorfault.errors import InputError
 from rotorfault.flight import Flight, fly
 

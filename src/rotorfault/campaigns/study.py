@@ -1,6 +1,6 @@
 """Studies: which flights a campaign flies, as TOML or from Python, checked once.
 
-Built-in studies are in ``rotorfault/campaign/studies``. A study names axes (a map has two), quantities that are drawn
+Built-in studies are in ``rotorfault/campaigns/studies``. A study names axes (a map has two), quantities that are drawn
 anew for each flight, and variants that are compared: every variant flies the same draws with the same seeds.
 """
 
@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from rotorfault.campaign.axes import AXES, axis
-from rotorfault.campaign.grades import GRADES, SURVIVED
-from rotorfault.campaign.refine import Refinement, looks
-from rotorfault.campaign.studies import FOLDER, study_names
+from rotorfault.campaigns.axes import AXES, axis
+from rotorfault.campaigns.grades import GRADES, SURVIVED
+from rotorfault.campaigns.refine import Refinement, looks
+from rotorfault.campaigns.studies import FOLDER, study_names
 from rotorfault.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
@@ -98,7 +98,7 @@ class Variant(Strict):
 
 
 class Refine(Strict):
-    """How many flights a cell gets; see `rotorfault.campaign.refine.Refinement`."""
+    """How many flights a cell gets; see `rotorfault.campaigns.refine.Refinement`."""
 
     initial: int = Field(default=24, ge=1, description="flights of a variant in each cell in the first round")
     block: int = Field(default=24, ge=1, description="further flights in a round, at least")

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from rotorfault.campaign.refine import further_flights
-from rotorfault.campaign.study import Draw, Study
+from rotorfault.campaigns.refine import further_flights
+from rotorfault.campaigns.study import Draw, Study
 from rotorfault.engine.noise import threefry
 from rotorfault.errors import InputError
 

@@ -10,11 +10,11 @@ import re
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from rotorfault.campaign.along_figure import outcome_figure, recovery_figure
-from rotorfault.campaign.curves import slices
-from rotorfault.campaign.line_figure import difference_lines, survival_lines
-from rotorfault.campaign.map_figure import Panel, difference_maps, survival_maps
-from rotorfault.campaign.maps import Maps
+from rotorfault.campaigns.along_figure import outcome_figure, recovery_figure
+from rotorfault.campaigns.curves import slices
+from rotorfault.campaigns.line_figure import difference_lines, survival_lines
+from rotorfault.campaigns.map_figure import Panel, difference_maps, survival_maps
+from rotorfault.campaigns.maps import Maps
 from rotorfault.report.style import STYLE
 
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from rotorfault.campaign.figures import draw
-from rotorfault.campaign.maps import maps
-from rotorfault.campaign.page import render
-from rotorfault.campaign.study import Study
+from rotorfault.campaigns.figures import draw
+from rotorfault.campaigns.maps import maps
+from rotorfault.campaigns.page import render
+from rotorfault.campaigns.study import Study
 from rotorfault.files import write_atomically
 from rotorfault.report.figures import save
 

@@ -48,7 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from rotorfault.campaign.statistics import clopper_pearson
+from rotorfault.campaigns.statistics import clopper_pearson
 from rotorfault.errors import InputError
 
 Array = NDArray[np.float64]

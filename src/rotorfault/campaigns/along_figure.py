@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rotorfault.campaign.axis_drawing import borders, columns, label, legend_columns, places, scale_x
-from rotorfault.campaign.grades import GRADES
-from rotorfault.campaign.line_figure import look
-from rotorfault.campaign.maps import PROBABILITIES, Maps
-from rotorfault.campaign.statistics import Array
+from rotorfault.campaigns.axis_drawing import borders, columns, label, legend_columns, places, scale_x
+from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.line_figure import look
+from rotorfault.campaigns.maps import PROBABILITIES, Maps
+from rotorfault.campaigns.statistics import Array
 from rotorfault.report.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, new_figure, padded, shown
 
 GRADE_COLOURS = dict(zip(GRADES, (BLUE, SKY, GREEN, "#F0E442", ORANGE, VERMILION, "0.35"), strict=True))

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.campaign.axis_drawing import (
+from rotorfault.campaigns.axis_drawing import (
     DIFFERENCE_COLOURS,
     SURVIVAL_COLOURS,
     borders,
@@ -22,11 +22,11 @@ from rotorfault.campaign.axis_drawing import (
     places,
     ticks,
 )
-from rotorfault.campaign.curves import LEVELS, Crossings, Slice, crossings, edges
-from rotorfault.campaign.grades import GRADES
-from rotorfault.campaign.limits import Limits
-from rotorfault.campaign.maps import Maps, Pairing, VariantMap, View
-from rotorfault.campaign.statistics import Array
+from rotorfault.campaigns.curves import LEVELS, Crossings, Slice, crossings, edges
+from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.limits import Limits
+from rotorfault.campaigns.maps import Maps, Pairing, VariantMap, View
+from rotorfault.campaigns.statistics import Array
 from rotorfault.report.style import BLACK, BLUE, VERMILION
 
 Spec = dict[str, Any]

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rotorfault.campaign.axis_drawing import label, legend_columns, places, scale_x
-from rotorfault.campaign.curves import LEVELS, Slice, crossings, edges
-from rotorfault.campaign.maps import Maps
+from rotorfault.campaigns.axis_drawing import label, legend_columns, places, scale_x
+from rotorfault.campaigns.curves import LEVELS, Slice, crossings, edges
+from rotorfault.campaigns.maps import Maps
 from rotorfault.report.style import BLACK, COLOURS, GREY, LINES, new_figure, shown
 
 LINE = Slice("", (slice(None),))

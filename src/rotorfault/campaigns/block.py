@@ -8,10 +8,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rotorfault.campaign.axes import columns
-from rotorfault.campaign.grades import grades
-from rotorfault.campaign.plan import Flights, drawn, identifier, seeds
-from rotorfault.campaign.study import Study
+from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.grades import grades
+from rotorfault.campaigns.plan import Flights, drawn, identifier, seeds
+from rotorfault.campaigns.study import Study
 from rotorfault.many import fly_many
 from rotorfault.metrics import SURVIVED as IN_ONE_PIECE
 from rotorfault.score_table import ScoreTable
@@ -45,7 +45,7 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
     -------
     pyarrow.Table
         One row per flight in order: ``flight`` (within the block), ``id`` (within the campaign, see
-        `rotorfault.campaign.plan.identifier`), ``variant``, ``cell``, ``number``, axes and draws by name, ``seed``,
+        `rotorfault.campaigns.plan.identifier`), ``variant``, ``cell``, ``number``, axes and draws by name, ``seed``,
         ``grade``, ``survived``, ``outcome``, ``recovery_time`` [s], ``altitude_lost`` [m], and `METRICS`.
 
     Raises

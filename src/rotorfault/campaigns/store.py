@@ -10,7 +10,7 @@
 
 A part appears whole, by one rename, and is never written again; so a kill costs the blocks that were in flight and
 nothing else, and any Parquet reader may look at the folder at any time. Every part names its campaign, round and
-block and carries digests (`rotorfault.campaign.parquet`), so that what is damaged, foreign or misplaced is found.
+block and carries digests (`rotorfault.campaigns.parquet`), so that what is damaged, foreign or misplaced is found.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 import pyarrow as pa
 
-from rotorfault.campaign.folder import (
+from rotorfault.campaigns.folder import (
     FLIGHTS,
     LOCK,
     PARTS,
@@ -35,9 +35,9 @@ from rotorfault.campaign.folder import (
     see_that_there_is_space,
     write,
 )
-from rotorfault.campaign.identity import Identity, identity, read_identity
-from rotorfault.campaign.lock import Lock
-from rotorfault.campaign.parquet import DamagedError, canonical, content_digest, decode, encode
+from rotorfault.campaigns.identity import Identity, identity, read_identity
+from rotorfault.campaigns.lock import Lock
+from rotorfault.campaigns.parquet import DamagedError, canonical, content_digest, decode, encode
 from rotorfault.errors import InputError
 
 Key = tuple[int, int]

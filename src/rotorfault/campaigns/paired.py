@@ -16,7 +16,7 @@ controller's flights in a cell by their results, so the number of seeds that bot
 the ``anytime`` functions there, or on the first block of every cell, whose size is fixed.
 
 Pairs must be independent. Cells that share their seeds have pairs that are not: there, compare cell by cell and
-correct with `rotorfault.campaign.statistics.holm`; sums over cells and `overall_difference` need seeds of its own in
+correct with `rotorfault.campaigns.statistics.holm`; sums over cells and `overall_difference` need seeds of its own in
 each cell.
 """
 
@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import bdtr, betaln, gammaln, ndtri, stdtrit, xlogy
 
-from rotorfault.campaign.statistics import Array, check_level
+from rotorfault.campaigns.statistics import Array, check_level
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.allocation.hover import hover_margin
-from rotorfault.campaign.axes import Columns, columns
-from rotorfault.campaign.statistics import Array
-from rotorfault.campaign.study import Draw, Study
+from rotorfault.campaigns.axes import Columns, columns
+from rotorfault.campaigns.statistics import Array
+from rotorfault.campaigns.study import Draw, Study
 from rotorfault.geometry import PerRotor, Vec3
 from rotorfault.scenario import Scenario
 from rotorfault.vehicle import Vehicle

@@ -9,7 +9,7 @@ holm               S. Holm, Scand. J. Stat. 6 (1979) 65-70
 =================  ===================================================================================================
 
 The intervals are for a number of flights that was fixed beforehand. Where earlier results decided how many flights
-there are, those of `rotorfault.campaign.refine` hold.
+there are, those of `rotorfault.campaigns.refine` hold.
 """
 
 from __future__ import annotations

@@ -14,10 +14,10 @@ import numpy as np
 from contourpy import contour_generator
 from numpy.typing import NDArray
 
-from rotorfault.campaign.boundary import Boundary, boundary
-from rotorfault.campaign.limits import Limits, limits
-from rotorfault.campaign.maps import Maps, VariantMap, View
-from rotorfault.campaign.statistics import Array, Interval
+from rotorfault.campaigns.boundary import Boundary, boundary
+from rotorfault.campaigns.limits import Limits, limits
+from rotorfault.campaigns.maps import Maps, VariantMap, View
+from rotorfault.campaigns.statistics import Array, Interval
 
 LEVELS = (0.5, 0.99)
 MOST_SLICES = 6
@@ -43,7 +43,7 @@ class Crossings(NamedTuple):
     ----------
     level : float
     lines : list of ndarray, shape (points, 2)
-        Between cells straight, as `rotorfault.campaign.boundary` has it; none on maps with names on an axis, and
+        Between cells straight, as `rotorfault.campaigns.boundary` has it; none on maps with names on an axis, and
         for a study with one axis.
     points : ndarray, shape (crossings, 2)
         On lines of the grid; where survival changes along both axes alike, on both.

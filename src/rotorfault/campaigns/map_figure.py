@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rotorfault.campaign.axis_drawing import (
+from rotorfault.campaigns.axis_drawing import (
     DIFFERENCE_COLOURS,
     FLIGHTS_COLOURS,
     SURVIVAL_COLOURS,
@@ -25,9 +25,9 @@ from rotorfault.campaign.axis_drawing import (
     scale_x,
     scale_y,
 )
-from rotorfault.campaign.curves import LEVELS, Crossings, Slice, crossings, edges, slices
-from rotorfault.campaign.maps import Maps
-from rotorfault.campaign.statistics import Array
+from rotorfault.campaigns.curves import LEVELS, Crossings, Slice, crossings, edges, slices
+from rotorfault.campaigns.maps import Maps
+from rotorfault.campaigns.statistics import Array
 from rotorfault.report.style import BLACK, VERMILION, new_figure, shown
 
 HALO: dict[str, Any] = {"color": "white", "linestyle": "-", "linewidth": 2.4, "alpha": 0.85}

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import MaxNLocator
 
-from rotorfault.campaign.maps import View
-from rotorfault.campaign.statistics import Array
+from rotorfault.campaigns.maps import View
+from rotorfault.campaigns.statistics import Array
 from rotorfault.report.style import BLUE, ORANGE, SKY, shown, unit
 
 MOST_TICKS = 9

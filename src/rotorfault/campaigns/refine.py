@@ -6,7 +6,7 @@ go first: cells whose interval holds a survival of interest, or whose estimate l
 of a neighbour. Nothing is drawn at random, so the same counts give the same next round.
 
 `intervals` covers with its level whatever the rule, the neighbours and the budget do; how, and what it was compared
-with, is said in `rotorfault.campaign.sampling_plan`. What it needs is that the flights of one controller in one cell
+with, is said in `rotorfault.campaigns.sampling_plan`. What it needs is that the flights of one controller in one cell
 are independent of each other, and flown in an order of seeds that was fixed beforehand. Cells and controllers may
 share seeds: what they have in common decides when a cell is left, but not whether its own flights mislead.
 """
@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotorfault.campaign.sampling_plan import Plan, sampling_plan
-from rotorfault.campaign.statistics import Array, Interval, wilson
+from rotorfault.campaigns.sampling_plan import Plan, sampling_plan
+from rotorfault.campaigns.statistics import Array, Interval, wilson
 from rotorfault.errors import InputError
 
 Counts = NDArray[np.int64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from rotorfault.campaign.identity import Identity, read_identity
+from rotorfault.campaigns.identity import Identity, read_identity
 from rotorfault.errors import InputError
 from rotorfault.files import is_leftover, write_durably
 

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import pyarrow as pa
 
-from rotorfault.campaign.axes import columns
-from rotorfault.campaign.block import fly_block, vary
-from rotorfault.campaign.plan import Counts, Flights, blocks, next_round
-from rotorfault.campaign.store import Store
-from rotorfault.campaign.study import Study, study_from
+from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.block import fly_block, vary
+from rotorfault.campaigns.plan import Counts, Flights, blocks, next_round
+from rotorfault.campaigns.store import Store
+from rotorfault.campaigns.study import Study
 from rotorfault.errors import InputError
 from rotorfault.progress import Bar
 from rotorfault.sweep import assemble_group, checked_columns, groups_of
@@ -70,7 +70,7 @@ def open_store(study: Study, folder: Path, resume: bool, repair: bool = False) -
     Raises
     ------
     InputError
-        See `rotorfault.campaign.store.Store`.
+        See `rotorfault.campaigns.store.Store`.
     """
     tables, digest = study.as_tables(), source_digest()
     if resume or repair:
@@ -129,11 +129,12 @@ def fly(study: Study, store: Store, crew: Crew, say: Say = lambda _: None) -> Pr
         title, total = f"round {number + 1}", sum(part.size for _, part in missing)
         sizes = {block: part.size for block, part in missing}
         with Bar(title, total, "flights") as bar:
-            here = 0
+            here = alive = 0
             for block, table in crew.fly(study, missing):
                 store.put(number, block, table)
                 here += sizes[block]
-                bar.update(here)
+                alive += int(np.count_nonzero(table["survived"].to_numpy(zero_copy_only=False)))
+                bar.update(here, f"{100.0 * alive / here:.0f} % of them survived")
         flown += total
         for block, _ in work:
             table = store.get(number, block)
@@ -156,18 +157,6 @@ def _told(study: Study, number: int, successes: Counts, trials: Counts) -> str:
     return f"round {number}: {trials.sum():,} flights so far; survived over the map: {shares}"
 
 
-def study_in(folder: Path) -> tuple[Study, Store]:
-    """The study of a folder, and its results to read.
-
-    Raises
-    ------
-    InputError
-        If the folder holds no campaign.
-    """
-    store = Store.open(folder)
-    return study_from(store.study, str(folder / "study.json")), store
-
-
 def crew(threads: int | None, scheduler: str | None) -> Crew:
     """Who flies: this process, or the workers of a Dask scheduler.
 
@@ -180,5 +169,5 @@ def crew(threads: int | None, scheduler: str | None) -> Crew:
         return Here(threads or os.cpu_count())
     if importlib.util.find_spec("distributed") is None:
         raise InputError("--scheduler needs Dask, which is not installed; install rotorfault[cluster]")
-    found: Any = importlib.import_module("rotorfault.campaign.cluster").Cluster(scheduler)
+    found: Any = importlib.import_module("rotorfault.campaigns.cluster").Cluster(scheduler)
     return found  # type: ignore[no-any-return]

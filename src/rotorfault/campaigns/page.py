@@ -16,13 +16,13 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
-from rotorfault.campaign import charts, grades
-from rotorfault.campaign.block import RECOVERED
-from rotorfault.campaign.charts import signed
-from rotorfault.campaign.curves import slices
-from rotorfault.campaign.maps import Maps
-from rotorfault.campaign.paired import Difference
-from rotorfault.campaign.statistics import Array
+from rotorfault.campaigns import charts, grades
+from rotorfault.campaigns.block import RECOVERED
+from rotorfault.campaigns.charts import signed
+from rotorfault.campaigns.curves import slices
+from rotorfault.campaigns.maps import Maps
+from rotorfault.campaigns.paired import Difference
+from rotorfault.campaigns.statistics import Array
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 MEANINGS = {
@@ -51,7 +51,7 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
     figures : mapping of str to Path
         SVG files to be shown: ``outcomes`` and ``recovery``.
     """
-    template = (resources.files("rotorfault.campaign") / "campaign.html.j2").read_text(encoding="utf-8")
+    template = (resources.files("rotorfault.campaigns") / "campaign.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     cells = [charts.variant_cells(maps, k, folder) for k in range(len(maps.variants))]
     sections = _sections(maps, folder, cells)
