@@ -413,6 +413,44 @@ def test_a_lost_flight_is_data(engine: str) -> None:
     np.testing.assert_array_equal(signals[:, :, 1], run(good, engine).signals[:, :, 0])
 
 
+@every_engine
+def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last record of a flight is the first one from its end on, whenever the engine notices the end."""
+    falling = [
+        short(duration=3.0, record_period=0.035, sensors="ideal", fault=[fault])
+        for fault in (
+            {"kind": "step", "rotor": 2, "time": 0.1, "loss": 1.0},
+            {"kind": "step", "rotor": 2, "time": 0.6, "loss": 1.0},
+        )
+    ]
+    both = run(assemble_all(falling), engine)
+    names = leaf_names(assemble(falling[0]).state)
+    ends = both.state[names.index("scores.end")]
+    assert (both.state[names.index("scores.over")] != 0.0).all()
+    last = np.ceil(ends / 7).astype(int)
+    assert last[0] < last[1] == len(both.steps) - 1
+    assert np.isfinite(both.signals[: last[0] + 1, :, 0]).all()
+    assert np.isnan(both.signals[last[0] + 1 :, :, 0]).all()
+    for i, scenario in enumerate(falling):
+        alone = run(scenario, engine)
+        assert len(alone.steps) == last[i] + 1
+        np.testing.assert_array_equal(alone.signals[:, :, 0], both.signals[: last[i] + 1, :, i])
+    for module in ("batch", "simd"):
+        if module != "simd" or have_simd():
+            monkeypatch.setattr(f"rotorfault.engine.{module}.CHUNK", 13)
+    np.testing.assert_array_equal(run(assemble_all(falling), engine).signals, both.signals)
+
+
+@every_engine
+def test_an_end_between_two_records_far_apart_is_recorded(engine: str) -> None:
+    """The engine flies on until the record, though nothing else is left to fly for."""
+    fault = {"kind": "step", "rotor": 2, "time": 0.1, "loss": 1.0}
+    batch = assemble(short(duration=0.005 * 3 * CHUNK, record_period=0.005 * (CHUNK + 3), fault=[fault]))
+    found = run(batch, engine)
+    assert 0 < found.state[leaf_names(batch.state).index("scores.end"), 0] < CHUNK
+    assert found.steps.tolist() == [0.0, CHUNK + 3.0]
+
+
 def test_engines_are_found_by_name() -> None:
     with pytest.raises(InputError, match=r"unknown engine 'nunpy'; did you mean 'numpy'\?"):
         load_engine("nunpy")
@@ -526,8 +564,8 @@ def test_a_cache_that_cannot_be_written_is_done_without(
 
 
 def test_the_key_tells_structures_apart() -> None:
-    def digest(**tables: Any) -> str:
-        return cache.key(assemble(short(**tables)).loop, "1", "quiet").digest
+    def digest(**tables: Any) -> str | None:
+        return cache.key(assemble(short(**tables)).loop, "1", "quiet")
 
     base = digest()
     assert digest() == base
@@ -542,10 +580,42 @@ def test_the_key_tells_structures_apart() -> None:
         digest(plant="paper_model"),
         digest(step=0.001),
         digest(sensors="ideal"),
-        cache.key(assemble(short()).loop, "2", "quiet").digest,
-        cache.key(assemble(short()).loop, "1", "recording").digest,
+        cache.key(assemble(short()).loop, "2", "quiet"),
+        cache.key(assemble(short()).loop, "1", "recording"),
     ]
     assert len({base, *others}) == 1 + len(others)
+
+
+class ArrayGains:
+    """A block from outside the package whose numbers lie in an array that it keeps to itself."""
+
+    def __init__(self, gains: Any) -> None:
+        self.gains = np.asarray(gains)
+
+    def parameters(self, vehicle: Any, period: float) -> tuple[()]:
+        return ()
+
+    def initial(self, measurement: Any, reference: Any, parameters: Any) -> tuple[()]:
+        return ()
+
+    def step(self, memory: Any, inputs: Any, parameters: Any, dt: Any) -> Any:
+        climb = (inputs.reference.p_W.z - inputs.measurement.p_W.z) * self.gains[0].item()
+        nothing = rotorfault.Vec3(0.0, 0.0, 0.0)
+        wrench = rotorfault.Wrench(inputs.vehicle.mass * (inputs.vehicle.gravity + climb), nothing)
+        return memory, rotorfault.ControlOutput(wrench, nothing, rotorfault.no_telemetry())
+
+
+def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another one's code must not serve, neither in the process nor from the disk."""
+    for gains in ([1.0], [3.0], [1.0]):
+        block = ArrayGains(gains)
+        found = rotorfault.fly(short(), controller=block, engine="simd")
+        wanted = rotorfault.fly(short(), controller=block, engine="python")
+        assert np.abs(found.data["position"] - wanted.data["position"]).max() < 1e-9
+    assert compiler.count == 2
+    forget(monkeypatch)
+    rotorfault.fly(short(), controller=ArrayGains([3.0]), engine="simd")
+    assert compiler.count == 2, "the same numbers were compiled before"
 
 
 def test_structure_is_one_word_per_part() -> None:

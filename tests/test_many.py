@@ -103,6 +103,29 @@ def test_what_changes_the_loop_makes_groups() -> None:
         assert flights.table["cost"][i] == pytest.approx(flights.replay(i).summary()["cost"], rel=1e-12), i
 
 
+def test_a_kind_may_come_after_the_keys_it_brings() -> None:
+    """The order of the columns means nothing: a kind drops the settings of the one before it, not those varied."""
+    keys = {"controller.law.eta.0": [3.0, 5.0], "controller.kind": ["smc", "smc"]}
+    scenario = base(controller="roismc")
+    one = rf.fly_many(scenario, keys)
+    other = rf.fly_many(scenario, dict(reversed(keys.items())))
+    np.testing.assert_array_equal(one.table["cost"], other.table["cost"])
+    assert one.table["cost"][0] != one.table["cost"][1]
+    settings = {"controller.law.eta.0": 3.0, "controller.kind": "smc"}
+    forward = rf.load_scenario("hover-fault", settings)
+    assert forward == rf.load_scenario("hover-fault", dict(reversed(settings.items())))
+
+
+def test_bounds_that_move_together() -> None:
+    """Each value is judged with the others of its flight, not with those of the scenario."""
+    ramp = {"kind": "ramp", "rotor": 2, "start": 0.1, "end": 0.2, "loss": 0.3}
+    vary = {"fault.0.start": [0.1, 0.25], "fault.0.end": [0.2, 0.35]}
+    flights = rf.fly_many(base(fault=[ramp]), vary)
+    assert flights.table["cost"][1] == pytest.approx(flights.replay(1).summary()["cost"], rel=1e-12)
+    with pytest.raises(InputError, match="flight 1"):
+        rf.fly_many(base(fault=[ramp]), {"fault.0.start": [0.1, 0.25]})
+
+
 def test_numbers_are_assembled_as_one_by_one() -> None:
     scenario = base()
     vary = columns(scenario)

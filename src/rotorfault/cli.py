@@ -320,6 +320,13 @@ def bench(
     for path in (as_json, figure):
         if path is not None:
             files.output_folder(path.parent)
+    if as_json is not None and as_json.is_dir():
+        raise InputError(f"--json {as_json}: is a folder; give a file")
+    if figure is not None:
+        if figure.suffix not in (".png", ".svg", ".pdf"):
+            raise InputError(f"--figure {figure}: allowed: a file that ends in .png, .svg or .pdf")
+        if importlib.util.find_spec("heyoka") is None:
+            raise InputError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
     # Before NumPy is loaded: with problems this small the threads of BLAS only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     study = _load("bench.study")

@@ -97,6 +97,7 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
 
         Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
         """
+        folder = folder.resolve()
         campaign = load("campaigns.api").Campaign(folder)
         study, again = campaign.study, load("campaigns.replay")
         if (flight is None) == (cell is None):

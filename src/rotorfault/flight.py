@@ -24,7 +24,7 @@ from rotorfault.netcdf import write_netcdf
 from rotorfault.progress import Bar
 from rotorfault.records import unflatten
 from rotorfault.report.text import summary_text
-from rotorfault.scenario import Scenario, load_scenario, override, scenario_from
+from rotorfault.scenario import Scenario, load_scenario, override_all, scenario_from
 from rotorfault.scoring import KINDS
 from rotorfault.versions import versions
 
@@ -240,8 +240,7 @@ def prepare(
     if isinstance(scenario, Scenario) and not overrides:
         return scenario
     tables = scenario.as_tables() if isinstance(scenario, Scenario) else copy.deepcopy(dict(scenario))
-    for key, value in overrides.items():
-        override(tables, key, value)
+    override_all(tables, overrides)
     return scenario_from(tables, str(tables.get("name", "scenario")))
 
 

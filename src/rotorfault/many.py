@@ -150,10 +150,14 @@ def fly_many(
     count = len(next(iter(columns.values())))
     rows = _rows(record)
     groups = groups_of(checked, columns)
-    steps = {group.scenario.steps for group in groups}
+    if within is not None and not within > 0.0:
+        raise InputError(f"within: got {within!r}; allowed: a length in m above 0")
+    if threads is not None and threads < 1:
+        raise InputError(f"threads: got {threads!r}; allowed: 1 or more")
+    one = groups[0].scenario  # for all, where signals are recorded
     if rows and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
         raise InputError("recorded flights must have one length and one recording period; fly them apart")
-    records = -(-max(steps) // checked.every) if rows else 0
+    records = -(-one.steps // one.every) if rows else 0
     if records * len(rows) * count > MOST_NUMBERS:
         raise InputError(
             f"record: {records} records of {len(rows)} signals of {count} flights take more memory than there is; "
@@ -178,7 +182,7 @@ def fly_many(
             bar.update(done)
     place = np.argsort(np.concatenate(order))
     table = ScoreTable({key: column[place] for key, column in ScoreTable.joined(tables).columns.items()})
-    times: Array = np.arange(records, dtype=np.float64) * (checked.every * checked.period)
+    times: Array = np.arange(records, dtype=np.float64) * (one.every * one.period)
     return Flights(checked, columns, table, signals, tuple(SIGNAL_NAMES[i] for i in rows), times, flown)
 
 

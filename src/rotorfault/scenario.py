@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -273,8 +274,7 @@ def load_scenario(name_or_path: str | Path, overrides: dict[str, Any] | None = N
     tables = parse_toml(text, where)
     if folder is not None:
         _relative_to(folder, tables)
-    for key, value in (overrides or {}).items():
-        override(tables, key, value)
+    override_all(tables, overrides or {})
     return scenario_from(tables, where)
 
 
@@ -289,6 +289,17 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
         tables["vehicle"] = str(folder / vehicle)
     if isinstance(reference, dict) and isinstance(reference.get("file"), str):
         reference["file"] = str(folder / reference["file"])
+
+
+def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Set several dotted keys in tables, in place: whole tables and kinds first, for they drop what was in them."""
+
+    def outermost_first(key: str) -> tuple[int, bool]:
+        *path, last = key.split(".")
+        return (len(path), False) if last == "kind" else (len(path) + 1, True)
+
+    for key in sorted(changes, key=outermost_first):
+        override(tables, key, changes[key])
 
 
 def override(tables: dict[str, Any], key: str, value: Any) -> None:

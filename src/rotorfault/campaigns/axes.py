@@ -40,8 +40,14 @@ def _wind(values: Mapping[str, NDArray[Any]]) -> Columns:
     }
 
 
+def _onset(values: Mapping[str, NDArray[Any]]) -> Columns:
+    return {} if "ramp" in values else {"fault.0.time": values["onset"]}
+
+
 def _ramp(values: Mapping[str, NDArray[Any]]) -> Columns:
-    onset = np.asarray(values.get("onset", 1.0), dtype=float)
+    if "onset" not in values:
+        raise InputError("axis 'ramp' needs 'onset', when it begins; give it as an axis or a draw too")
+    onset = np.asarray(values["onset"], dtype=float)
     start, length = np.broadcast_arrays(onset, np.asarray(values["ramp"], dtype=float))
     return {"fault.0.start": np.array(start), "fault.0.end": start + np.maximum(length, 1e-3)}
 
@@ -51,7 +57,7 @@ _NOISE = {"position": 0.005, "velocity": 0.01, "attitude": 0.002, "rate": 0.005}
 AXES: dict[str, Axis] = {
     "rotor": Axis("", "rotor of the first fault, 1 to 4", _key("rotor", "fault.0.rotor"), (1, 4)),
     "loss": Axis("1", "loss of the first fault", _key("loss", "fault.0.loss"), (0.0, 1.0)),
-    "onset": Axis("s", "time of the first fault", _key("onset", "fault.0.time"), (0.0, np.inf)),
+    "onset": Axis("s", "time of the first fault", _onset, (0.0, np.inf)),
     "ramp": Axis("s", "length of the first fault's ramp (kind ramp), which begins at onset", _ramp, (0.0, np.inf)),
     "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, 4)),
     "second_loss": Axis("1", "loss of the second fault", _key("second_loss", "fault.1.loss"), (0.0, 1.0)),

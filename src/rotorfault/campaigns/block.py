@@ -54,16 +54,18 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
         If a value is not allowed.
     """
     names = vary(study, flights)
-    parts: list[tuple[NDArray[np.intp], ScoreTable, float]] = []
+    parts: list[tuple[NDArray[np.intp], ScoreTable]] = []
+    heights = np.empty(flights.size)
     for variant in np.unique(flights.variant):
         which = np.flatnonzero(flights.variant == variant)
         mine = flights.part(which)
         scenario = study.scenario_of(int(variant))
         given: dict[str, Any] = dict(columns(vary(study, mine)))
         given["seed"] = seeds(study, mine)
-        parts.append((which, fly_many(scenario, given, within=RECOVERED, threads=threads).table, scenario.duration))
-    order = np.argsort(np.concatenate([which for which, _, _ in parts]))
-    table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t, _ in parts]).columns.items()})
+        parts.append((which, fly_many(scenario, given, within=RECOVERED, threads=threads).table))
+        heights[which] = scenario.reference.make().table(np.zeros(1)).p_W[0, 2]
+    order = np.argsort(np.concatenate([which for which, _ in parts]))
+    table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
     found: dict[str, Any] = {
         "flight": np.arange(flights.size, dtype=np.int64),
         "id": identifier(study, flights),
@@ -76,7 +78,7 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
         "survived": np.isin(graded, study.survived),
         "outcome": table["outcome"],
         "recovery_time": recovery_times(table),
-        "altitude_lost": altitudes_lost(table, _height(study)),
+        "altitude_lost": altitudes_lost(table, heights),
     }
     for name in METRICS:
         found[name.replace(".", "_")] = table[name]
@@ -93,15 +95,9 @@ def recovery_times(table: ScoreTable) -> NDArray[np.float64]:
         return np.where(in_one_piece & np.isfinite(first), np.maximum(settled - first, 0.0), np.nan)
 
 
-def altitudes_lost(table: ScoreTable, height: float) -> NDArray[np.float64]:
-    """By how much in m a flight fell below where it should be, from the first true loss on; NaN without a loss."""
-    return np.maximum(height - table["lowest_after_loss"], 0.0)
-
-
-def _height(study: Study) -> float:
-    """Height of the reference at its beginning in m."""
-    table = study.scenario_of(0).reference.make().table(np.zeros(1))
-    return float(table.p_W[0, 2])
+def altitudes_lost(table: ScoreTable, height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """By how much in m a flight fell below a height, where it began, after the first true loss; NaN without one."""
+    return np.asarray(np.maximum(height - table["lowest_after_loss"], 0.0))
 
 
 def _column(values: NDArray[Any]) -> pa.Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any, final
 
@@ -12,6 +13,7 @@ from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.plan import Flights
 from rotorfault.campaigns.study import Study, study_from
 from rotorfault.errors import InputError
+from rotorfault.versions import source_digest
 
 PATIENCE = 10.0  # s to reach the scheduler
 
@@ -32,6 +34,8 @@ class Cluster:
     """
 
     def __init__(self, address: str) -> None:
+        if not re.fullmatch(r"\w+://[^\s/]+:\d+", address):
+            raise InputError(f"--scheduler {address}: allowed: an address such as tcp://localhost:8786")
         try:
             self._client: Any = Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TimeoutError) as error:
@@ -44,7 +48,7 @@ class Cluster:
     def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Iterator[tuple[int, pa.Table]]:
         """Fly blocks on all workers."""
         tables = study.as_tables()
-        futures = {self._client.submit(_fly, tables, *part, pure=False): number for number, part in work}
+        futures = {self._client.submit(_fly, tables, source_digest(), *part, pure=False): number for number, part in work}
         try:
             for future, table in as_completed(list(futures), loop=self._client.loop, with_results=True):  # type: ignore[no-untyped-call]
                 yield futures[future], table
@@ -52,6 +56,8 @@ class Cluster:
             self._client.cancel(list(futures))
 
 
-def _fly(tables: dict[str, Any], *part: Any) -> pa.Table:
+def _fly(tables: dict[str, Any], program: str, *part: Any) -> pa.Table:
     """One block, on one thread: a worker has as many as it was given."""
+    if source_digest() != program:
+        raise InputError("a worker has another version of rotorfault; install the same everywhere")
     return fly_block(study_from(tables, "study"), Flights(*part), threads=1)

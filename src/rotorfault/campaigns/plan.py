@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from rotorfault.campaigns.axes import axis
 from rotorfault.campaigns.refine import further_flights
 from rotorfault.campaigns.study import Draw, Study
 from rotorfault.engine.noise import threefry
@@ -152,6 +153,7 @@ def _value(draw: Draw, share: NDArray[np.float64]) -> NDArray[Any]:
         return low + (high - low) * share
     if draw.normal is not None:
         mean, deviation = draw.normal
-        return np.asarray(mean + deviation * ndtri(np.clip(share, 1e-16, 1.0 - 1e-16)))
+        low, high = axis(draw.name).range
+        return np.asarray(np.clip(mean + deviation * ndtri(np.clip(share, 1e-16, 1.0 - 1e-16)), low, high))
     choices = np.array(draw.choice)
     return np.asarray(choices[np.minimum((share * len(choices)).astype(int), len(choices) - 1)])

@@ -6,8 +6,10 @@ anew for each flight, and variants that are compared: every variant flies the sa
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
+import re
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +25,8 @@ from rotorfault.campaigns.studies import FOLDER, study_names
 from rotorfault.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.errors import InputError
 from rotorfault.registry import unknown
-from rotorfault.scenario import Scenario, load_scenario
+from rotorfault.scenario import Scenario, load_scenario, override_all, scenario_from
+from rotorfault.vehicle_file import load_vehicle
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000
@@ -73,7 +76,9 @@ class Draw(Strict):
 
     name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
     uniform: tuple[float, float] | None = Field(default=None, description="least and largest value")
-    normal: tuple[float, float] | None = Field(default=None, description="mean and standard deviation")
+    normal: tuple[float, float] | None = Field(
+        default=None, description="mean and standard deviation; cut at the range of the axis"
+    )
     choice: tuple[float | str, ...] | None = Field(default=None, description="values, equally likely")
 
     @model_validator(mode="after")
@@ -87,6 +92,10 @@ class Draw(Strict):
             raise refusal("normal", f"got {list(self.normal)}; allowed: [mean, deviation above 0]")
         if self.choice is not None and not self.choice:
             raise refusal("choice", "is empty; give at least one value")
+        low, high = axis(self.name).range
+        for value in (*(self.uniform or ()), *(self.choice or ())):
+            if isinstance(value, float) and not low <= value <= high:
+                raise refusal("", f"{self.name} = {value:g}; allowed: {low:g} to {high:g}")
         return self
 
 
@@ -118,7 +127,9 @@ class Study(Strict):
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$", description="short name, also of the folder")
     description: str = Field(default="", description="one line")
-    scenario: str = Field(description="what is flown: name of a scenario, or a TOML file")
+    scenario: str | dict[str, Any] = Field(
+        description="what is flown: name of a scenario, a TOML file, or the tables of one"
+    )
     settings: dict[str, Any] = Field(default={}, description="dotted keys and values for all flights")
     seed: int = Field(default=0, ge=0, lt=2**40, description="names all random numbers")
     axis: tuple[GridAxis, ...] = Field(
@@ -199,6 +210,32 @@ class Study(Strict):
         places = np.unravel_index(cells, self.shape)
         return {part.name: np.array(part.grid)[place] for part, place in zip(self.axis, places, strict=True)}
 
+    def resolved(self) -> Study:
+        """The same study with the scenario itself in place of its name, and vehicles in place of their files.
+
+        So the folder of a campaign holds all that its flights depend on, whatever becomes of the files.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be read.
+        """
+        tables = self.as_tables()
+        if isinstance(self.scenario, str):
+            try:
+                tables["scenario"] = load_scenario(self.scenario).as_tables()
+            except InputError as error:
+                raise InputError(f"variant '{self.variant[0].label}': {error}") from None
+        for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
+            if str(settings.get("vehicle", "")).endswith(".toml"):
+                settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
+        return study_from(tables, self.name)
+
+    @property
+    def scenario_name(self) -> str:
+        """Name of what is flown."""
+        return self.scenario if isinstance(self.scenario, str) else str(self.scenario.get("name", "scenario"))
+
     def scenario_of(self, variant: int) -> Scenario:
         """What a variant flies, before anything varies.
 
@@ -209,7 +246,11 @@ class Study(Strict):
         """
         settings = {**self.settings, **self.variant[variant].settings}
         try:
-            return load_scenario(self.scenario, settings)
+            if isinstance(self.scenario, str):
+                return load_scenario(self.scenario, settings)
+            tables = copy.deepcopy(self.scenario)
+            override_all(tables, settings)
+            return scenario_from(tables, str(tables.get("name", "scenario")))
         except InputError as error:
             raise InputError(f"variant '{self.variant[variant].label}': {error}") from None
 
@@ -263,8 +304,9 @@ def changed(
     """
     tables = study.as_tables()
     if vehicle is not None:
-        tables["settings"] = {**tables.get("settings", {}), "vehicle": vehicle}
-        tables["name"] += f"-{Path(vehicle).stem}"
+        for variant in tables["variant"]:
+            variant["settings"] = {**variant.get("settings", {}), "vehicle": vehicle}
+        tables["name"] += "-" + re.sub(r"[^A-Za-z0-9_.-]", "-", Path(vehicle).stem)
     if preset is not None:
         for variant in tables["variant"]:
             variant["settings"] = {**variant.get("settings", {}), "controller.preset": preset}

@@ -13,8 +13,8 @@ from rotorfault.engine.batch import (
     columns,
     drive_rows,
     drive_template,
+    ends_of,
     no_watch,
-    over_row,
     recorded,
 )
 from rotorfault.records import unflatten
@@ -25,7 +25,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
     template = drive_template(batch)
     parameters = unflatten(batch.parameters, list(columns(batch.parameters, batch.flights)))
     state = unflatten(batch.state, list(columns(batch.state, batch.flights)))
-    records, done, interrupted, over = Records(batch), 0, False, over_row(batch)
+    records, done, interrupted, ends = Records(batch), 0, False, ends_of(batch)
     try:
         with np.errstate(all="ignore"):  # failure is data: NaN shows in the record
             for first, rows in drive_rows(batch):
@@ -35,7 +35,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
                     done += 1
                     if k in wanted:
                         records.add(first + k, columns(signals, batch.flights)[None])
-                if watch(done) or (columns(state, batch.flights)[over] != 0.0).all():
+                if watch(done) or ends.passed(columns(state, batch.flights), done).all():
                     break
     except KeyboardInterrupt:
         interrupted = True

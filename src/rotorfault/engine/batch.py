@@ -41,7 +41,7 @@ class Batch(NamedTuple):
 class Recording(NamedTuple):
     """What came of a batch; a batch whose flights were all over early has fewer records."""
 
-    signals: Array  # (records, recorded rows of `Signals`, N); NaN where a flight was over long before
+    signals: Array  # (records, recorded rows of `Signals`, N); NaN after the first record from a flight's end on
     steps: Array  # (records,): number of the step at which each record was taken
     state: Array  # (leaves of `LoopState`, N): at the end, scores included
     flown: int  # flight-steps that were computed
@@ -120,9 +120,37 @@ def recorded(batch: Batch, first: int, length: int) -> list[int]:
     return [k for k in range(length) if batch.every and (first + k) % batch.every == 0]
 
 
-def over_row(batch: Batch) -> int:
-    """Row of the state that is not 0 once a flight is over."""
-    return leaf_names(batch.state).index("scores.over")
+class Ends(NamedTuple):
+    """Tells which flights nothing more is to be computed of: those that are over and whose end is on record.
+
+    What is recorded of a flight must not depend on when an engine notices that it is over, which happens between
+    two chunks of steps: its last record is the first one from its end on.
+    """
+
+    every: int  # a record each so many steps; 0 for none
+    over: int  # row of the state that is not 0 once a flight is over
+    end: int  # row of the state with the step at which that was
+
+    def last_record(self, rows: Array) -> Array:
+        """Number of the last record of each flight, infinite for those that are not over.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (leaves of `LoopState`, flights)
+        """
+        return np.where(rows[self.over] != 0.0, np.ceil(rows[self.end] / max(self.every, 1)), np.inf)
+
+    def passed(self, rows: Array, reached: int) -> NDArray[np.bool_]:
+        """Whether each flight needs to be flown no further than the steps done."""
+        if not self.every:
+            return np.asarray(rows[self.over] != 0.0)
+        return np.asarray(self.last_record(rows) * self.every < reached)
+
+
+def ends_of(batch: Batch) -> Ends:
+    """Tells the ends of the flights of a batch."""
+    names = leaf_names(batch.state)
+    return Ends(batch.every, names.index("scores.over"), names.index("scores.end"))
 
 
 class Records:
@@ -134,6 +162,7 @@ class Records:
 
     def __init__(self, batch: Batch) -> None:
         self.every = batch.every
+        self._ends = ends_of(batch)
         self._rows = None if batch.wanted is None else list(batch.wanted)
         capacity = 0 if batch.every == 0 else -(-batch.steps // batch.every)
         width = len(SIGNAL_NAMES) if self._rows is None else len(self._rows)
@@ -167,5 +196,10 @@ class Records:
         """All of them; KeyboardInterrupt if it came before the first."""
         if interrupted and self._filled == 0:
             raise KeyboardInterrupt
+        if self.every:
+            last = self._ends.last_record(state)
+            self._filled = int(min(self._filled, last.max() + 1))
+            gone = np.arange(self._filled)[:, None] > last
+            self._signals[: self._filled].transpose(0, 2, 1)[gone] = np.nan
         steps: Array = np.arange(self._filled, dtype=np.float64) * float(self.every)
         return Recording(self._signals[: self._filled], steps, state, flown, interrupted)

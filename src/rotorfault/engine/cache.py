@@ -1,8 +1,8 @@
 """Compiled loops, kept in the process and on disk so that each is compiled once on a machine.
 
 The key names everything that the compiled code depends on: the source of this package, the compiler's version, the
-processor, and the structure of the loop (classes and settings of its parts). A part from outside the package adds
-the source of its own module; where that cannot be read, the loop is kept in the process only.
+processor, and the structure of the loop (classes and settings of its parts). Of a part from outside the package
+nobody knows what it depends on: a loop with one is traced anew each time, and its key is the program itself.
 
 On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
 off). A file begins with the SHA-256 of the rest, for damaged code would be loaded without complaint; one that is
@@ -12,7 +12,6 @@ damaged or cannot be read is compiled anew and replaced.
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import os
 from collections.abc import Callable
@@ -29,13 +28,6 @@ KEEP = 200  # compiled loops on disk
 _SUM_LENGTH = hashlib.sha256().digest_size
 
 
-class Key(NamedTuple):
-    """Name of a compiled loop, and whether it may go to disk."""
-
-    digest: str
-    lasting: bool
-
-
 class Compiled(NamedTuple):
     """Object code of a loop, and what its caller must know."""
 
@@ -47,8 +39,8 @@ class Compiled(NamedTuple):
 _KEPT: dict[str, Compiled] = {}
 
 
-def key(loop: ClosedLoop, compiler: str, form: str) -> Key:
-    """Name of a compiled form of a loop.
+def key(loop: ClosedLoop, compiler: str, form: str) -> str | None:
+    """Name of a compiled form of a loop; None where only its program can name it.
 
     Parameters
     ----------
@@ -58,27 +50,30 @@ def key(loop: ClosedLoop, compiler: str, form: str) -> Key:
     form : str
         Which of the programs of the loop.
     """
-    words = [_package_digest(), compiler, form, *structure(loop)]
-    lasting = True
-    for part in parts_of(loop):
-        if not type(part).__module__.startswith("rotorfault."):
-            source = _source(part)
-            lasting = lasting and source is not None
-            # Without source, only this very object can be known to be the same again.
-            words.append(source if source is not None else str(id(part)))
-    return Key(hashlib.sha256("\n".join(words).encode()).hexdigest(), lasting)
+    if any(not type(part).__module__.startswith("rotorfault.") for part in parts_of(loop)):
+        return None
+    return _digest(_package_digest(), compiler, form, *structure(loop))
 
 
-def get(name: Key, make: Callable[[], Compiled]) -> Compiled:
+def key_of_program(text: str, compiler: str) -> str:
+    """Name of what a program is compiled to."""
+    return _digest("program", compiler, text)
+
+
+def _digest(*words: str) -> str:
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+def get(name: str, make: Callable[[], Compiled]) -> Compiled:
     """The compiled loop of this name, made if there is none."""
-    if name.digest not in _KEPT:
+    if name not in _KEPT:
         path = _path(name)
         found = _load(path)
         if found is None:
             found = make()
             _store(path, found)
-        _KEPT[name.digest] = found
-    return _KEPT[name.digest]
+        _KEPT[name] = found
+    return _KEPT[name]
 
 
 def folder() -> Path | None:
@@ -92,9 +87,9 @@ def folder() -> Path | None:
     return Path(base) / "rotorfault"
 
 
-def _path(name: Key) -> Path | None:
-    place = folder() if name.lasting else None
-    return None if place is None else place / f"{name.digest}.loop"
+def _path(name: str) -> Path | None:
+    place = folder()
+    return None if place is None else place / f"{name}.loop"
 
 
 def _prune(place: Path) -> None:
@@ -112,6 +107,7 @@ def _load(path: Path | None) -> Compiled | None:
         sum_, made = content[:_SUM_LENGTH], content[_SUM_LENGTH:]
         if hashlib.sha256(made).digest() != sum_:
             return None
+        os.utime(path)  # what is used stays: the oldest are removed
         head, _, code = made.partition(b"\n")
         about: dict[str, Any] = json.loads(head)
         return Compiled(code, Layout(**about["layout"]), about["operations"])
@@ -141,11 +137,3 @@ def _package_digest() -> str:
     for path in sorted(root.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def _source(part: Any) -> str | None:
-    try:
-        module = inspect.getmodule(type(part))
-        return None if module is None else inspect.getsource(module)
-    except (OSError, TypeError):
-        return None

@@ -9,7 +9,7 @@ import numpy as np
 from rotorfault.engine import cache, native
 from rotorfault.engine.batch import Array, Batch
 from rotorfault.engine.cache import Compiled
-from rotorfault.engine.program import program, trace
+from rotorfault.engine.program import Program, program, trace
 from rotorfault.progress import Busy
 
 _FUNCTIONS = (("prepare", 2, 1), ("fly", 4, 2))
@@ -65,14 +65,21 @@ class Machines(NamedTuple):
     def get(self, with_signals: bool) -> Machine:
         """The program with or without signals, compiled if it is not yet."""
         name = cache.key(self.batch.loop, native.compiler(), "recording" if with_signals else "quiet")
-        if name.digest not in _LOADED:
-            _LOADED[name.digest] = Machine(cache.get(name, lambda: self._compile(with_signals)))
-        return _LOADED[name.digest]
+        written: Program | None = None
+        if name is None:
+            written = self._written(with_signals)
+            name = cache.key_of_program(written.text, native.compiler())
+        if name not in _LOADED:
+            _LOADED[name] = Machine(cache.get(name, lambda: _compiled(written or self._written(with_signals))))
+        return _LOADED[name]
 
-    def _compile(self, with_signals: bool) -> Compiled:
-        with Busy("compiling the closed loop (once for its parts, then kept)"):
-            written = program(trace(self.batch), native.lanes(), with_signals)
-            return Compiled(native.compile_text(written.text), written.layout, dict(written.operations))
+    def _written(self, with_signals: bool) -> Program:
+        return program(trace(self.batch), native.lanes(), with_signals)
+
+
+def _compiled(written: Program) -> Compiled:
+    with Busy("compiling the closed loop (once for its parts, then kept)"):
+        return Compiled(native.compile_text(written.text), written.layout, dict(written.operations))
 
 
 def aligned(shape: tuple[int, ...]) -> Array:

@@ -40,7 +40,6 @@ class Layout(NamedTuple):
     parameters: int  # that `prepare` reads
     prepared: int  # that it writes and `fly` reads
     state: int
-    over: int  # row of the state that is not 0 once the flight is over
     shared: int
     signals: int
 
@@ -73,12 +72,10 @@ def trace(batch: Batch) -> Traced:
     """Run the closed loop of a batch once, on terms."""
     loop, template = batch.loop, drive_template(batch)
     shared = len(flatten(template.reference))
-    names = leaf_names(batch.state)
     layout = Layout(
         parameters=len(flatten(batch.parameters)) + len(SEED),
         prepared=0,
-        state=len(names),
-        over=names.index("scores.over"),
+        state=len(leaf_names(batch.state)),
         shared=shared,
         signals=0,
     )

@@ -15,8 +15,8 @@ from rotorfault.engine.batch import (
     columns,
     drive_rows,
     drive_template,
+    ends_of,
     no_watch,
-    over_row,
     recorded,
 )
 from rotorfault.records import flatten, unflatten
@@ -34,7 +34,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
     states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.flights)]
     lost = [False] * batch.flights
     missing = [np.nan] * len(SIGNAL_NAMES)
-    records, done, interrupted, over = Records(batch), 0, False, over_row(batch)
+    records, done, interrupted, ends = Records(batch), 0, False, ends_of(batch)
 
     def state() -> Array:
         return np.array([[float(leaf) for leaf in flatten(one)] for one in states]).T
@@ -58,7 +58,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
                 done += 1
                 if k in wanted:
                     records.add(first + k, np.array(taken).T[None])
-            if watch(done) or (state()[over] != 0.0).all():
+            if watch(done) or ends.passed(state(), done).all():
                 break
     except KeyboardInterrupt:
         interrupted = True

@@ -17,7 +17,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, no_watch
+from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, ends_of, no_watch
 from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
@@ -81,7 +81,7 @@ class _Common:
         self.layout, self.lanes = any_machine.layout, any_machine.lanes
         groups = -(-batch.flights // self.lanes)
         self.block_size = min(GROUPS, -(-groups // threads)) * self.lanes  # work for all, if there is enough
-        self.records = Records(batch)
+        self.records, self.ends = Records(batch), ends_of(batch)
         self.state = np.zeros((self.layout.state, batch.flights))
         self.reference = np.ascontiguousarray(batch.reference)
         self.stop = threading.Event()
@@ -188,11 +188,11 @@ class _Block:
     def _drop(self) -> None:
         """Let flights that are over make room, where that saves a group of lanes."""
         lanes, count = self._common.lanes, len(self._flights)
-        over = self._flying[:, self._common.layout.over].reshape(-1)[:count] != 0.0
+        rows = ungrouped(self._flying, count)
+        over = self._common.ends.passed(rows, self.reached)
         left = int(count - over.sum())
         if -(-left // lanes) == len(self._flying) and left:
             return
-        rows = ungrouped(self._flying, count)
         self._keep(self._flights[over], rows[:, over])
         flying = np.flatnonzero(~over)
         self._flights = self._flights[flying]

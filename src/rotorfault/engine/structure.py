@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rotorfault.closed_loop import ClosedLoop
+from rotorfault.geometry import Value
 
 
 def structure(loop: ClosedLoop) -> tuple[str, ...]:
@@ -40,9 +43,19 @@ def describe(value: Any, floats: bool = False) -> str:
         return repr(value)
     if isinstance(value, (tuple, list)):
         return f"[{', '.join(describe(item, floats) for item in value)}]"
+    if isinstance(value, np.ndarray):
+        return f"array({value.dtype}, {value.shape}, {value.tobytes().hex()})"
+    if isinstance(value, np.generic):
+        return describe(value.item(), floats)
+    if isinstance(value, Value):
+        return f"{type(value).__name__}[{', '.join(describe(item, floats) for item in value)}]"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{key}: {describe(item, floats)}' for key, item in value.items())}}}"
     kind = type(value)
     floats = floats or not kind.__module__.startswith("rotorfault.")
+    if callable(value) or (not hasattr(value, "__dict__") and hasattr(kind, "__slots__")):
+        return (
+            f"{kind.__module__}.{kind.__qualname__} at {id(value)}"  # nothing can be told of it but which one it is
+        )
     inside = vars(value) if hasattr(value, "__dict__") else {}
     return f"{kind.__module__}.{kind.__qualname__}({describe(dict(sorted(inside.items())), floats)})"
