@@ -27,7 +27,7 @@ EVERYTHING: dict[str, Any] = {
     "fault.0.time": [0.05, 0.1, 0.15, 0.05, 0.1, 0.15, 0.2],
     "wind.velocity_W.1": DRAW.uniform(-5.0, 5.0, COUNT),
     "sensors.rate": DRAW.uniform(0.0, 0.01, COUNT),
-    "controller.law.eta.0": DRAW.uniform(3.0, 5.0, COUNT),
+    "controller.law.attitude.reaching.0": DRAW.uniform(9.0, 11.0, COUNT),
     "diagnosis.decision.threshold": DRAW.uniform(0.1, 0.3, COUNT),
     "seed": np.arange(COUNT) * 10**9,
 }
@@ -73,7 +73,7 @@ def test_each_is_the_flight_that_it_would_be_alone(engine: str) -> None:
     """To the last bit, whatever varies: vehicle, start, faults, wind, noise, gains, thresholds, seed."""
     scenario = base()
     vary = columns(scenario)
-    assert len(vary) >= 11
+    assert set(vary) == set(EVERYTHING)
     flights = rf.fly_many(scenario, vary, record=["position", "fault_flag.r2"], engine=engine)
     assert len(flights) == COUNT
     for i in (0, 3, 6):
@@ -105,15 +105,19 @@ def test_what_changes_the_loop_makes_groups() -> None:
 
 def test_a_kind_may_come_after_the_keys_it_brings() -> None:
     """The order of the columns means nothing: a kind drops the settings of the one before it, not those varied."""
-    keys = {"controller.law.eta.0": [3.0, 5.0], "controller.kind": ["smc", "smc"]}
+    keys = {"controller.law.attitude.layer": [3.0, 5.0], "controller.kind": ["smc", "smc"]}
     scenario = base(controller="roismc")
     one = rf.fly_many(scenario, keys)
     other = rf.fly_many(scenario, dict(reversed(keys.items())))
     np.testing.assert_array_equal(one.table["cost"], other.table["cost"])
     assert one.table["cost"][0] != one.table["cost"][1]
-    settings = {"controller.law.eta.0": 3.0, "controller.kind": "smc"}
-    forward = rf.load_scenario("hover-fault", settings)
-    assert forward == rf.load_scenario("hover-fault", dict(reversed(settings.items())))
+    settings = {"controller.law.attitude.layer": 3.0, "controller.kind": "smc"}
+    forward, backward = (
+        rf.load_scenario("hover-fault", dict(order)).model_dump(mode="json")
+        for order in (settings.items(), reversed(settings.items()))
+    )
+    assert forward == backward
+    assert forward["controller"]["law"]["attitude"]["layer"] == 3.0
 
 
 def test_bounds_that_move_together() -> None:
