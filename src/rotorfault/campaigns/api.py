@@ -1,0 +1,127 @@
+"""Campaigns from Python: `campaign`, and the `Campaign` that it gives back."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
+
+import pyarrow as pa
+
+from rotorfault.campaigns import run
+from rotorfault.campaigns.replay import replay
+from rotorfault.campaigns.store import Store
+from rotorfault.campaigns.study import Study, changed, load_study, study_from
+from rotorfault.errors import InputError
+from rotorfault.flight import Flight
+
+if TYPE_CHECKING:
+    from rotorfault.campaigns.maps import Maps
+
+Say = Callable[[str], None]
+
+
+@final
+class Campaign:
+    """A campaign in its folder, complete or not.
+
+    Attributes
+    ----------
+    folder : Path
+    study : Study
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self._store = Store.open(self.folder)
+        self.study: Study = study_from(self._store.study, str(self.folder / "study.json"))
+
+    def __repr__(self) -> str:
+        return f"<campaign {self.study.name} in {self.folder}>"
+
+    def table(self) -> pa.Table:
+        """One row per flight that has been flown."""
+        return self._store.table()
+
+    def maps(self) -> Maps:
+        """Survival, intervals, grades, differences by cell; see `rotorfault.campaigns.maps`."""
+        found: Maps = importlib.import_module("rotorfault.campaigns.maps").maps(self.study, self.table())
+        return found
+
+    def report(self) -> list[Path]:
+        """Write pictures and page; the page's path first."""
+        made: list[Path] = importlib.import_module("rotorfault.campaigns.report").write(
+            self.study, self.table(), self.folder, self._store.identity.versions
+        )
+        return made
+
+    def replay(self, identifier: int) -> Flight:
+        """Fly one of the flights once more, with everything recorded: column ``id`` of the table names it."""
+        return replay(self.study, identifier)
+
+
+def campaign(
+    study: str | Path | Mapping[str, Any] | Study,
+    out: str | Path | None = None,
+    *,
+    resume: bool = False,
+    repair: bool = False,
+    vehicle: str | None = None,
+    preset: str | None = None,
+    seed: int | None = None,
+    budget: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    say: Say = lambda _: None,
+) -> Campaign:
+    """Fly a campaign.
+
+    Parameters
+    ----------
+    study : str, Path, mapping or Study
+        Name of a built-in study, path of a TOML file, tables as such a file holds, or a checked study.
+    out : str or Path, optional
+        Folder; ``campaigns/NAME`` if not given.
+    resume : bool
+        Go on with the campaign in the folder.
+    repair : bool
+        Go on; move damaged parts aside and fly them anew.
+    vehicle, preset, seed, budget : optional
+        In place of the study's.
+    workers : int, optional
+        Threads; one per core if not given. Nothing in the table depends on it.
+    scheduler : str, optional
+        Address of a Dask scheduler, whose workers fly.
+    say : callable
+        Is told, line by line, what was moved aside and what each round gave.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    InputError
+        If anything that was given cannot be used; nothing has been flown then.
+    KeyboardInterrupt
+        On Ctrl-C; what is done is kept in the folder.
+    """
+    if isinstance(study, Study):
+        checked = study
+    elif isinstance(study, (str, Path)):
+        checked = load_study(study)
+    elif isinstance(study, Mapping):
+        checked = study_from(dict(study), "study")
+    else:
+        raise InputError(f"study: got {study!r}; allowed: a name, a path, tables or a Study")
+    checked = changed(checked, vehicle, preset, seed, budget).resolved()
+    folder = Path("campaigns") / checked.name if out is None else Path(out)
+    run.check(checked)
+    crew = run.crew(workers, scheduler)
+    with run.open_store(checked, folder, resume, repair) as store:
+        for damage in store.repaired:
+            say(f"moved aside: {damage.name} ({damage.reason})")
+        done = run.fly(checked, store, crew, say)
+    say(f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {folder / 'flights.parquet'}")
+    return Campaign(folder)
