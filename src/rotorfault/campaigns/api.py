@@ -123,5 +123,6 @@ def campaign(
         for damage in store.repaired:
             say(f"moved aside: {damage.name} ({damage.reason})")
         done = run.fly(checked, store, crew, say)
-    say(f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {folder / 'flights.parquet'}")
+    table = folder / "flights.parquet"
+    say(f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {table}")
     return Campaign(folder)

@@ -47,8 +47,8 @@ class Cluster:
 
     def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Iterator[tuple[int, pa.Table]]:
         """Fly blocks on all workers."""
-        tables = study.as_tables()
-        futures = {self._client.submit(_fly, tables, source_digest(), *part, pure=False): number for number, part in work}
+        same = study.as_tables(), source_digest()
+        futures = {self._client.submit(_fly, *same, *part, pure=False): number for number, part in work}
         try:
             for future, table in as_completed(list(futures), loop=self._client.loop, with_results=True):  # type: ignore[no-untyped-call]
                 yield futures[future], table
