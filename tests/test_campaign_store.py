@@ -22,7 +22,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from campaign_studies import TINY
 
+import rotorfault
 from rotorfault.campaigns import identity as identity_module
 from rotorfault.campaigns import parquet
 from rotorfault.campaigns.lock import Lock
@@ -743,10 +745,16 @@ def test_pandas_reads_the_folder_as_it_is(at_work: Path) -> None:
 SNIPPETS = re.findall(r"^```python\n(.*?)^```", DOC.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a real campaign, where the documentation looks for one."""
+    folder = tmp_path_factory.mktemp("flown")
+    rotorfault.campaign(TINY, folder / "campaigns" / "partial-loss-map")
+    return folder
+
+
 @pytest.mark.parametrize("code", SNIPPETS, ids=[code.split()[1] for code in SNIPPETS])
-def test_the_documentation_runs(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_documentation_runs(code: str, flown: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip(code.split()[1].partition(".")[0], reason="the library is not installed")
-    with Store.open(filled(tmp_path / "results" / "campaign"), write=True) as store:
-        store.finish(BLOCKS)
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(flown)
     exec(compile(code, str(DOC), "exec"), {})

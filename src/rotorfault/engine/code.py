@@ -160,3 +160,36 @@ def declarations(lanes: int) -> Iterable[str]:
         yield f"declare {v} @llvm.{name}.v{lanes}f64({', '.join([v] * count)})"
     whole = f"<{lanes} x i64>"
     yield f"declare {whole} @llvm.fshl.v{lanes}i64({whole}, {whole}, {whole})"
+
+
+def over_groups(name: str, argument: str, read: int, written: int, lines: Iterable[str]) -> str:
+    """A function that does the same for each group of lanes.
+
+    Parameters
+    ----------
+    name : str
+    argument : str
+        Name of the pointer that `lines` read from; they write to ``%out``.
+    read, written : int
+        Numbers of a group there.
+    lines : iterable of str
+    """
+    body = "\n".join(lines)
+    return f"""
+define void @{name}(ptr noalias readonly %{argument}0, ptr noalias %out0, i64 %groups) {{
+entry:
+  br label %each
+each:
+  %g = phi i64 [ 0, %entry ], [ %g1, %each ]
+  %{argument}_at = mul i64 %g, {read}
+  %{argument} = getelementptr inbounds double, ptr %{argument}0, i64 %{argument}_at
+  %out_at = mul i64 %g, {written}
+  %out = getelementptr inbounds double, ptr %out0, i64 %out_at
+{body}
+  %g1 = add i64 %g, 1
+  %more = icmp slt i64 %g1, %groups
+  br i1 %more, label %each, label %done
+done:
+  ret void
+}}
+"""

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotorfault.engine import native
 from rotorfault.engine.batch import Array
-from rotorfault.engine.code import Code, declarations
+from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.machine import aligned, grouped, ungrouped
 from rotorfault.engine.trace import Tape
@@ -43,12 +43,8 @@ class CompiledFunction:
         for row, name in enumerate([emitter.number(term) for term in outputs]):
             code.store(name, "%out", row * lanes)
         self._rows, self._lanes, self.operations = len(outputs), lanes, Counter(code.counts)
-        text = _MODULE.format(
-            declarations="\n".join(declarations(lanes)),
-            code="\n".join(code.lines),
-            read=len(leaves) * lanes,
-            written=len(outputs) * lanes,
-        )
+        evaluate = over_groups("evaluate", "in", len(leaves) * lanes, len(outputs) * lanes, code.lines)
+        text = "\n".join([*declarations(lanes), evaluate])
         self._native = native.Native(native.compile_text(text), [("evaluate", 2, 1)])
 
     def __call__(self, rows: Array) -> Array:
@@ -78,25 +74,3 @@ class CompiledFunction:
     def bound(self, groups: Array, out: Array) -> Callable[[], None]:
         """`evaluate` with its arguments, to be called again and again."""
         return self._native.bound("evaluate", groups, out, len(groups))
-
-
-_MODULE = """
-{declarations}
-
-define void @evaluate(ptr noalias readonly %in0, ptr noalias %out0, i64 %groups) {{
-entry:
-  br label %each
-each:
-  %g = phi i64 [ 0, %entry ], [ %g1, %each ]
-  %in_at = mul i64 %g, {read}
-  %in = getelementptr inbounds double, ptr %in0, i64 %in_at
-  %out_at = mul i64 %g, {written}
-  %out = getelementptr inbounds double, ptr %out0, i64 %out_at
-{code}
-  %g1 = add i64 %g, 1
-  %more = icmp slt i64 %g1, %groups
-  br i1 %more, label %each, label %done
-done:
-  ret void
-}}
-"""

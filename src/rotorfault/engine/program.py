@@ -23,7 +23,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from rotorfault.engine.batch import Batch, as_drive, drive_template, streams_of
-from rotorfault.engine.code import Code, declarations
+from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.geometry import PerRotor, zeros
@@ -153,10 +153,9 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
     kept = max((row + 1 for pointer, row, _ in traced.sections[0].writes if pointer == "%kept"), default=1)
     text = _MODULE.format(
         declarations="\n".join(declarations(lanes)),
-        prepare="\n".join(before.lines),
+        prepare=over_groups("prepare", "par", layout.parameters * lanes, prepared * lanes, before.lines),
         step=_body(pieces, traced.substeps),
         latch="step" if len(pieces) == 1 else "moved",
-        raw=layout.parameters * lanes,
         prepared=prepared * lanes,
         state=layout.state * lanes,
         out=layout.signals * lanes if with_signals else 0,
@@ -210,23 +209,7 @@ def _fixed(outputs: Iterable[Term]) -> list[Term]:
 _MODULE = """
 {declarations}
 
-define void @prepare(ptr noalias readonly %par0, ptr noalias %out0, i64 %groups) {{
-entry:
-  br label %each
-each:
-  %g = phi i64 [ 0, %entry ], [ %g1, %each ]
-  %par_at = mul i64 %g, {raw}
-  %par = getelementptr inbounds double, ptr %par0, i64 %par_at
-  %out_at = mul i64 %g, {prepared}
-  %out = getelementptr inbounds double, ptr %out0, i64 %out_at
 {prepare}
-  %g1 = add i64 %g, 1
-  %more = icmp slt i64 %g1, %groups
-  br i1 %more, label %each, label %done
-done:
-  ret void
-}}
-
 define void @fly(ptr noalias %state0, ptr noalias readonly %par0, ptr noalias readonly %shared0,
                  ptr noalias %out0, i64 %groups, i64 %steps) {{
 entry:

@@ -54,8 +54,7 @@ def describe(value: Any, floats: bool = False) -> str:
     kind = type(value)
     floats = floats or not kind.__module__.startswith("rotorfault.")
     if callable(value) or (not hasattr(value, "__dict__") and hasattr(kind, "__slots__")):
-        return (
-            f"{kind.__module__}.{kind.__qualname__} at {id(value)}"  # nothing can be told of it but which one it is
-        )
+        # Nothing can be told of it but which one it is.
+        return f"{kind.__module__}.{kind.__qualname__} at {id(value)}"
     inside = vars(value) if hasattr(value, "__dict__") else {}
     return f"{kind.__module__}.{kind.__qualname__}({describe(dict(sorted(inside.items())), floats)})"
