@@ -4,7 +4,7 @@
 
 Chances are computed, not sampled: of each number of survivals at each look, from look to look by binomial steps.
 Per probability of survival: coverage in %, mean width of the interval, mean number of flights. ``least`` is the
-lowest coverage of 999 probabilities. All rules look after the numbers of flights of `rotorfault.campaigns.refine`.
+lowest coverage of 999 probabilities. All rules look after the numbers of flights of `rotorfault.campaigns.sampling.refine`.
 
 fixed            not a rule: as many flights as Clopper-Pearson needs at this probability, known beforehand
 wilson, exact    ends when Wilson's or Clopper-Pearson's interval of a fixed number is narrow: what does not hold
@@ -12,7 +12,7 @@ two-stage        the first block decides the number of further flights, and only
 bonferroni       Clopper-Pearson with the error divided by the number of looks
 simultaneous     Clopper-Pearson with the largest error for which all looks hold together
 mixture          likelihood ratio against a beta mixture (Robbins): holds after any number of flights
-plan             `rotorfault.campaigns.sampling_plan`: what is used
+plan             `rotorfault.campaigns.sampling.sampling_plan`: what is used
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from scipy.special import betaln, xlog1py, xlogy
 from scipy.stats import binom
 
-from rotorfault.campaigns.refine import Refinement, looks
-from rotorfault.campaigns.sampling_plan import Plan, sampling_plan
-from rotorfault.campaigns.statistics import Interval, clopper_pearson, wilson
+from rotorfault.campaigns.sampling.refine import Refinement, looks
+from rotorfault.campaigns.sampling.sampling_plan import Plan, sampling_plan
+from rotorfault.campaigns.sampling.statistics import Interval, clopper_pearson, wilson
 
 Array = NDArray[np.float64]
 Rule = tuple[list[NDArray[np.bool_]], list[Interval]]  # by look: where it ends, intervals

@@ -77,11 +77,11 @@ def main() -> None:
         folder = Path(name)
         filled = folder / "filled"
         for arguments in (["--help"], ["list"], list(FLY)):
-            command = ["-m", "rotorfault.cli", *arguments]
+            command = ["-m", "rotorfault.cli.main", *arguments]
             run(command, folder, filled)
             times = [run(command, folder, filled) for _ in range(wanted.runs)]
             print(line(" ".join(arguments[:4]), times), flush=True)
-        times = [run(["-m", "rotorfault.cli", *FLY], folder, folder / f"empty-{i}") for i in range(wanted.cold)]
+        times = [run(["-m", "rotorfault.cli.main", *FLY], folder, folder / f"empty-{i}") for i in range(wanted.cold)]
         print(line(f"{' '.join(FLY[:4])}, empty cache", times), flush=True)
         inside = [run(["-c", IN_PYTHON], folder, filled).output.split() for _ in range(wanted.runs)]
         fly, summary, save = (statistics.median(map(float, column)) for column in zip(*inside, strict=True))

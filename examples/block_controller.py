@@ -3,7 +3,7 @@
     rotorfault fly paper-set-point --controller examples/block_controller.py:PdBlock
 
 A block has three methods. `parameters` collects its numbers, `initial` its memory, `step` is one sampling instant:
-pure, without `if` on values (use `rotorfault.scalar.select`) and without state of its own. So the same source runs
+pure, without `if` on values (use `rotorfault.maths.scalar.select`) and without state of its own. So the same source runs
 on floats, on arrays and compiled. This one is a PD cascade: position error to tilt, tilt error to torque.
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rotorfault import ControlInputs, ControlOutput, Measurement, Reference, Vec3, Vehicle, Wrench, no_telemetry
-from rotorfault.scalar import Scalar, atan2, clip, cos, maximum, sin, wrap_angle
+from rotorfault.maths.scalar import Scalar, atan2, clip, cos, maximum, sin, wrap_angle
 
 
 class Gains(NamedTuple):

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.allocation import ALLOCATORS
-from rotorfault.allocation.protocol import settings_class
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.records import flatten
-from rotorfault.signals import Allocation, Diagnosis, Wrench, healthy
-from rotorfault.vehicle import Vehicle, wrench_of
-from rotorfault.vehicle_file import load_vehicle, vehicle_names
+from rotorfault.autopilot.allocation import ALLOCATORS
+from rotorfault.autopilot.allocation.protocol import settings_class
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.records import flatten
+from rotorfault.model.signals import Allocation, Diagnosis, Wrench, healthy
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 
 Array = NDArray[np.float64]
 PAPER = load_vehicle("paper").vehicle

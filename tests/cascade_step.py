@@ -8,14 +8,14 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.allocation.attainable import thrust_available
-from rotorfault.control import CONTROLLERS
-from rotorfault.control.cascade import Cascade, CascadeSettings
-from rotorfault.control.protocol import ControlInputs, Prediction
-from rotorfault.geometry import PerRotor, Vec3, zeros
-from rotorfault.signals import Measurement, Reference
-from rotorfault.vehicle import Vehicle
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.autopilot.allocation.available import thrust_available
+from rotorfault.autopilot.control import CONTROLLERS
+from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings
+from rotorfault.autopilot.control.protocol import ControlInputs, Prediction
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.model.signals import Measurement, Reference
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]
 VEHICLE = load_vehicle("paper").vehicle

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from hypothesis import settings
 
-from rotorfault.vehicle import Vehicle
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_file import load_vehicle
 
 # The same examples in every run, and none judged by the time it takes.
 settings.register_profile("rotorfault", deadline=None, derandomize=True, max_examples=60)

@@ -14,8 +14,8 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from rotorfault.dataset import ATTRIBUTES, dataset
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.results.dataset import ATTRIBUTES, dataset
 
 ONSET, THRESHOLD = 1.8, 0.12
 UNIT = re.compile(r"\(.+\)$")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorfault.control.riccati import (
+from rotorfault.autopilot.control.riccati import (
     AttitudeProblem,
     Gain,
     attitude_problem,
@@ -15,8 +15,8 @@ from rotorfault.control.riccati import (
     newton_kleinman_step,
     routh_stable,
 )
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.records import flatten, unflatten
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten, unflatten
 
 ONE = Vec3(1.0, 1.0, 1.0)
 

@@ -10,15 +10,15 @@ import pytest
 from figure_checks import check_nothing_covered, check_units, legend_labels, texts
 from numpy.typing import NDArray
 
-from rotorfault.assembly import assemble, assemble_all
+from rotorfault.base.errors import InputError
 from rotorfault.bench import accuracy
 from rotorfault.bench.accuracy import FLIGHTS, HELD, SAMPLED, manoeuvre, measure, positions
 from rotorfault.bench.accuracy_figure import draw
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Batch, no_watch
 from rotorfault.engine.taylor import fly_taylor
-from rotorfault.errors import InputError
-from rotorfault.scenario import Scenario
+from rotorfault.flight.assembly import assemble, assemble_all
+from rotorfault.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 PERIOD = 0.01

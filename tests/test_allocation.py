@@ -28,11 +28,11 @@ from allocation_cases import (
 from hypothesis import given, settings
 from scipy.optimize import linprog, lsq_linear
 
-from rotorfault.allocation.mixer import nominal_inverse, pair_demand, rotor_thrusts
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.records import flatten
-from rotorfault.signals import healthy
-from rotorfault.vehicle import Vehicle, wrench_of
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.records import flatten
+from rotorfault.model.mixer import nominal_inverse, pair_demand, rotor_thrusts
+from rotorfault.model.signals import healthy
+from rotorfault.model.vehicle import Vehicle, wrench_of
 
 # ------------------------------------------------------------------------------------------------------- the inverse
 

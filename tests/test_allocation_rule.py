@@ -19,11 +19,11 @@ from allocation_cases import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.allocation import ALLOCATORS, Effectiveness, Nominal, PaperRule
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.records import flatten
-from rotorfault.signals import Wrench, healthy
-from rotorfault.vehicle import wrench_of
+from rotorfault.autopilot.allocation import ALLOCATORS, Effectiveness, Nominal, PaperRule
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.records import flatten
+from rotorfault.model.signals import Wrench, healthy
+from rotorfault.model.vehicle import wrench_of
 
 # -------------------------------------------------------------------------------------------------------- paper rule
 

@@ -49,13 +49,13 @@ def graph() -> dict[str, set[str]]:
 
 def test_imports_are_found_wherever_they_stand() -> None:
     code = "from .. import plant\nfrom ..plant.wind import Gust\nif x:\n    import rotorfault.plant.rotors as r\n"
-    found = set(imports(ast.parse(code), "rotorfault.control.smc", Path("smc.py")))
+    found = set(imports(ast.parse(code), "rotorfault.autopilot.control.smc", Path("smc.py")))
     assert found >= {"rotorfault.plant", "rotorfault.plant.wind", "rotorfault.plant.rotors"}
 
 
 def test_the_graph_sees_the_imports_that_are_there() -> None:
-    assert "rotorfault.geometry" in graph()["rotorfault.vehicle"]
-    assert "rotorfault.allocation.mixer" in graph()["rotorfault.allocation.effectiveness"]
+    assert "rotorfault.maths.geometry" in graph()["rotorfault.model.vehicle"]
+    assert "rotorfault.model.mixer" in graph()["rotorfault.autopilot.allocation.effectiveness"]
 
 
 def test_belief_never_reaches_truth() -> None:

@@ -13,8 +13,8 @@ pytest.importorskip("llvmlite")
 from rotorfault.bench import flights, peak, study
 from rotorfault.bench.sdre import OURS, SCIPY, measure
 from rotorfault.engine.function import CompiledFunction
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.records import flatten, unflatten
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten, unflatten
 
 
 def turned(matrix: Mat3, v: Vec3) -> tuple[Vec3, float]:

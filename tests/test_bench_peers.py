@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from rotorfault.base.errors import InputError
 from rotorfault.bench import peers
-from rotorfault.errors import InputError
 
 TOP = {
     "version": str,

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.campaigns.boundary import boundary
-from rotorfault.campaigns.refine import Refinement, further_flights, intervals
-from rotorfault.campaigns.statistics import Interval, clopper_pearson
-from rotorfault.errors import InputError
+from rotorfault.base.errors import InputError
+from rotorfault.campaigns.sampling.boundary import boundary
+from rotorfault.campaigns.sampling.refine import Refinement, further_flights, intervals
+from rotorfault.campaigns.sampling.statistics import Interval, clopper_pearson
 
 WIND = np.linspace(0.0, 10.0, 21)  # m/s, an axis that is not of whole numbers
 FLIGHTS = 1000

@@ -52,7 +52,7 @@ width = 0.5
 
 def call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "rotorfault.cli", *arguments],
+        [sys.executable, "-m", "rotorfault.cli.main", *arguments],
         cwd=folder, env={**os.environ, "PYTHONPATH": SOURCE}, capture_output=True, text=True, check=False,
     )  # fmt: skip
 

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from campaign_studies import TINY
 
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns import run
-from rotorfault.campaigns.plan import Flights
+from rotorfault.campaigns.sampling.plan import Flights
 from rotorfault.campaigns.study import Study, study_from
 from rotorfault.engine import have_simd
-from rotorfault.errors import InputError
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
@@ -37,7 +37,7 @@ def complete(study: Study, folder: Path, crew: run.Crew) -> bytes:
 
 def test_a_killed_worker_costs_nothing(cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is lost and nothing is there twice: the very bytes of a campaign on this process alone."""
-    monkeypatch.setattr("rotorfault.campaigns.plan.FLIGHTS_IN_BLOCK", 6)
+    monkeypatch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 6)
     study = study_from(TINY, "test")
     killed: list[int] = []
 

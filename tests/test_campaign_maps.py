@@ -16,20 +16,20 @@ from figure_checks import check_nothing_covered
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from rotorfault import versions
-from rotorfault.allocation.hover import hover_margin
+from rotorfault.analysis.hover import hover_margin
+from rotorfault.base import versions
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns import charts, curves, figures, report
 from rotorfault.campaigns.grades import GRADES
-from rotorfault.campaigns.limits import limits
-from rotorfault.campaigns.maps import Maps, maps
-from rotorfault.campaigns.paired import difference_anytime, mcnemar_anytime, overall_difference
-from rotorfault.campaigns.refine import Refinement, intervals
-from rotorfault.campaigns.statistics import holm
+from rotorfault.campaigns.report.limits import limits
+from rotorfault.campaigns.report.maps import Maps, maps
+from rotorfault.campaigns.sampling.paired import difference_anytime, mcnemar_anytime, overall_difference
+from rotorfault.campaigns.sampling.refine import Refinement, intervals
+from rotorfault.campaigns.sampling.statistics import holm
 from rotorfault.campaigns.study import Study, study_from
-from rotorfault.cli import app
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.cli.main import app
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.vehicle_file import load_vehicle
 
 LOSS = {"name": "loss", "values": [0.0, 0.2, 0.4, 0.6, 0.8]}
 WIND = {"name": "wind_speed", "values": [0.0, 4.0, 8.0]}

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from rotorfault.campaigns.refine import Refinement, finished, further_flights, intervals, looks
-from rotorfault.campaigns.sampling_plan import Plan, sampling_plan
-from rotorfault.campaigns.statistics import clopper_pearson, wilson
-from rotorfault.errors import InputError
+from rotorfault.base.errors import InputError
+from rotorfault.campaigns.sampling.refine import Refinement, finished, further_flights, intervals, looks
+from rotorfault.campaigns.sampling.sampling_plan import Plan, sampling_plan
+from rotorfault.campaigns.sampling.statistics import clopper_pearson, wilson
 
 Counts = NDArray[np.int64]
 

@@ -17,14 +17,14 @@ import pytest
 from campaign_studies import TINY
 
 import rotorfault
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
-from rotorfault.campaigns.plan import Flights, drawn, identified, identifier, next_round, seeds
 from rotorfault.campaigns.replay import identifier_of, replay
+from rotorfault.campaigns.sampling.plan import Flights, drawn, identified, identifier, next_round, seeds
 from rotorfault.campaigns.studies import study_names
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
 from rotorfault.engine import have_simd
-from rotorfault.errors import InputError
 
 pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
 SOURCE = str(Path(rotorfault.__file__).parents[1])
@@ -42,14 +42,14 @@ def complete(study: Study, folder: Path, crew: Any = None, resume: bool = False)
 
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rotorfault.campaigns.plan.FLIGHTS_IN_BLOCK", 10)
+    monkeypatch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 10)
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The table of the tiny study in blocks of ten."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rotorfault.campaigns.plan.FLIGHTS_IN_BLOCK", 10)
+        patch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 10)
         return complete(tiny(), tmp_path_factory.mktemp("undisturbed") / "campaign")
 
 
@@ -89,7 +89,7 @@ def test_an_interrupted_campaign_goes_on(tmp_path: Path, undisturbed: bytes) -> 
 def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, undisturbed: bytes) -> None:
     """Three kills at random moments, without a chance to tidy up."""
     code = (
-        "import sys, rotorfault.campaigns.plan as plan\n"
+        "import sys, rotorfault.campaigns.sampling.plan as plan\n"
         "plan.FLIGHTS_IN_BLOCK = 10\n"
         "from rotorfault.campaigns import run\n"
         "from rotorfault.campaigns.study import study_from\n"

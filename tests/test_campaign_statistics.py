@@ -10,9 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest, ttest_rel
 
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns import paired, statistics
-from rotorfault.campaigns.statistics import INTERVALS, clopper_pearson, holm, proportion_interval, quantiles, wilson
-from rotorfault.errors import InputError
+from rotorfault.campaigns.sampling.statistics import (
+    INTERVALS,
+    clopper_pearson,
+    holm,
+    proportion_interval,
+    quantiles,
+    wilson,
+)
 
 METHODS = sorted(INTERVALS)
 

@@ -25,13 +25,13 @@ import pytest
 from campaign_studies import TINY
 
 import rotorfault
+from rotorfault.base.errors import InputError
+from rotorfault.base.versions import source_digest
 from rotorfault.campaigns import identity as identity_module
 from rotorfault.campaigns import parquet
-from rotorfault.campaigns.lock import Lock
-from rotorfault.campaigns.parquet import content_digest
-from rotorfault.campaigns.store import Key, Store
-from rotorfault.errors import InputError
-from rotorfault.versions import source_digest
+from rotorfault.campaigns.store.lock import Lock
+from rotorfault.campaigns.store.parquet import content_digest
+from rotorfault.campaigns.store.store import Key, Store
 
 STUDY: dict[str, Any] = {"name": "test", "wind": {"speed": 5.0}, "losses": [0.1, 0.2]}
 BLOCKS: list[Key] = [*((0, block) for block in range(6)), *((1, block) for block in range(4))]
@@ -700,7 +700,7 @@ def test_a_disk_without_locks_is_said(folder: Path, monkeypatch: pytest.MonkeyPa
     def none(*_: object) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
-    monkeypatch.setattr("rotorfault.campaigns.lock._take", none)
+    monkeypatch.setattr("rotorfault.campaigns.store.lock._take", none)
     with pytest.raises(
         InputError, match=r"lock: cannot be locked \(No locks available\); give an --out on a disk of"
     ):

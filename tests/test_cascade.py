@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from rotorfault.assembly import assemble, assemble_all
-from rotorfault.control import CONTROLLERS
-from rotorfault.control.cascade import (
+from rotorfault.autopilot.control import CONTROLLERS
+from rotorfault.autopilot.control.cascade import (
     AttitudeReference,
     CascadeSettings,
     attitude_for,
@@ -23,10 +22,11 @@ from rotorfault.control.cascade import (
 )
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
-from rotorfault.geometry import Vec3, body_z_axis, zeros
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.signals import Measurement, Reference
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.flight.assembly import assemble, assemble_all
+from rotorfault.maths.geometry import Vec3, body_z_axis, zeros
+from rotorfault.model.signals import Measurement, Reference
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 each_controller = pytest.mark.parametrize("name", list(CONTROLLERS))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rotorfault as rf
-from rotorfault.scenario import Scenario
+from rotorfault.scenario.scenario import Scenario
 
 NEIGHBOURS = 100
 SETTLE_LIMIT = 2.5  # s, or 1 s after the fault where that interrupts

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 import rotorfault as rf
-from rotorfault import cli
+from rotorfault.cli import main as cli
 
 ROOT = Path(__file__).parent.parent
 
 
 def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "rotorfault.cli", *arguments]
+    command = [sys.executable, "-m", "rotorfault.cli.main", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=300)
 
 
@@ -30,7 +30,7 @@ def test_help_teaches(command: tuple[str, ...]) -> None:
 
 
 def test_help_loads_nothing_heavy() -> None:
-    script = "import sys, rotorfault.cli; print([m for m in sys.modules if m in {names}])"
+    script = "import sys, rotorfault.cli.main; print([m for m in sys.modules if m in {names}])"
     heavy = {"numpy", "scipy", "xarray", "matplotlib", "heyoka", "pydantic"}
     done = subprocess.run(
         [sys.executable, "-c", script.format(names=heavy)], capture_output=True, text=True, check=True
@@ -240,7 +240,16 @@ def test_folder_without_permission(tmp_path: Path) -> None:
 
 def test_interrupt_leaves_whole_files_or_none(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "rotorfault.cli", "fly", "paper-set-point", "--engine", "python", "--no-figures"]
+    command = [
+        sys.executable,
+        "-m",
+        "rotorfault.cli.main",
+        "fly",
+        "paper-set-point",
+        "--engine",
+        "python",
+        "--no-figures",
+    ]
     command += ["--set", "duration=600", "--out", str(out)]
     # A shell that runs the tests in the background lets its children ignore the signal; undone for this child.
     process = subprocess.Popen(

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rotorfault.assembly import assemble
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
+from rotorfault.flight.assembly import assemble
+from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.plant import PLANTS
-from rotorfault.scenario import scenario_from
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import scenario_from
 
 Array = NDArray[np.float64]
 PERIOD = 0.01

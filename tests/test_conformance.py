@@ -19,18 +19,18 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from rotorfault.assembly import assemble
-from rotorfault.catalogue import REGISTRIES
-from rotorfault.closed_loop import Drive
+from rotorfault.cli.catalogue import REGISTRIES
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, drive_template, no_watch
 from rotorfault.engine.noise import GUSTS, Noise
 from rotorfault.engine.structure import structure
-from rotorfault.geometry import Vec3, zeros
+from rotorfault.flight.assembly import assemble
+from rotorfault.loop.closed_loop import Drive
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.plant import no_noise
-from rotorfault.records import flatten, unflatten
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 Array = NDArray[np.float64]
 # Where a scenario names a part of each registry. The plant is a bare name: models of the body have no settings.

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.config import validate
-from rotorfault.diagnosis.decision import (
+from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
     DecisionSettings,
@@ -21,10 +20,11 @@ from rotorfault.diagnosis.decision import (
     spread_of,
     undecided,
 )
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor
-from rotorfault.vehicle import hover_thrust
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.vehicle import hover_thrust
+from rotorfault.model.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]
 VEHICLE = load_vehicle("paper").vehicle

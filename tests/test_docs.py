@@ -17,13 +17,13 @@ import pytest
 import typer.main
 
 import rotorfault as rf
+from rotorfault.autopilot.control.cascade import CascadeSettings
+from rotorfault.base.config import parse_toml
 from rotorfault.campaigns.study import study_from
-from rotorfault.catalogue import REGISTRIES, entries
-from rotorfault.cli import app
-from rotorfault.config import parse_toml
-from rotorfault.control.cascade import CascadeSettings
-from rotorfault.flight import prepare
-from rotorfault.scenario import parse_overrides, scenario_from
+from rotorfault.cli.catalogue import REGISTRIES, entries
+from rotorfault.cli.main import app
+from rotorfault.flight.flight import prepare
+from rotorfault.scenario.scenario import parse_overrides, scenario_from
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "rotorfault"

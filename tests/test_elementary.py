@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotorfault import scalar
+from rotorfault.maths import scalar
 
 pytest.importorskip("llvmlite")
 

@@ -14,23 +14,23 @@ import pytest
 from numpy.typing import NDArray
 
 import rotorfault
-from rotorfault.assembly import assemble, assemble_all
-from rotorfault.control.cascade import Cascade, CascadeSettings, limited_force
-from rotorfault.control.sdre import Sdre, Weights
+from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings, limited_force
+from rotorfault.autopilot.control.sdre import Sdre, Weights
+from rotorfault.base.errors import InputError
 from rotorfault.engine import ENGINES, cache, default_engine, have_simd, load_engine
 from rotorfault.engine.batch import CHUNK, Batch, Recording, no_watch
 from rotorfault.engine.noise import Noise
 from rotorfault.engine.structure import structure
-from rotorfault.errors import InputError
-from rotorfault.geometry import Vec3
-from rotorfault.metrics import attitude_error
-from rotorfault.neighbours import neighbour
-from rotorfault.records import leaf_names
-from rotorfault.scenario import Scenario, load_scenario, scenario_from
-from rotorfault.score_table import score_table
-from rotorfault.telemetry import SIGNAL_NAMES
-from rotorfault.touchdown import in_the_air
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.flight.assembly import assemble, assemble_all
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.records import leaf_names
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.results.metrics import attitude_error
+from rotorfault.results.score_table import score_table
+from rotorfault.results.touchdown import in_the_air
+from rotorfault.scenario.neighbours import neighbour
+from rotorfault.scenario.scenario import Scenario, load_scenario, scenario_from
 
 Array = NDArray[np.float64]
 POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)
@@ -261,7 +261,7 @@ def besides(data: Any, told: dict[str, Any], steps: int) -> dict[str, Any]:
 
 @every_engine
 def test_scores_are_those_of_the_records(engine: str) -> None:
-    """All that `rotorfault.metrics` counts from the records, counted in flight: the same on every engine."""
+    """All that `rotorfault.results.metrics` counts from the records, counted in flight: the same on every engine."""
     landing = {"ground": -0.4, "on_fault": "land", "duration": 3.0, "sensors": "ideal"}
     for scenario in (
         short(),
@@ -513,9 +513,9 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
     # Really another process: its compiler must not be asked.
     code = (
         "from rotorfault.engine import load_engine, native\n"
-        "from rotorfault.assembly import assemble\n"
+        "from rotorfault.flight.assembly import assemble\n"
         "from rotorfault.engine.batch import no_watch\n"
-        "from rotorfault.scenario import scenario_from\n"
+        "from rotorfault.scenario.scenario import scenario_from\n"
         "def refuse(text): raise SystemExit('compiled again')\n"
         "native.compile_text = refuse\n"
         f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"

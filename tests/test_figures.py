@@ -21,7 +21,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from rotorfault.errors import InputError
+from rotorfault.base.errors import InputError
 from rotorfault.report import figures, panels, style
 
 NAMES = {"position", "attitude", "rotor_speeds", "path", "fault_detection", "control", "control_detail"}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rotorfault as rf
-from rotorfault.telemetry import quantities
+from rotorfault.model.telemetry import quantities
 
 GOLDEN = Path(__file__).parent / "golden"
 SHORT = {"duration": 0.5}

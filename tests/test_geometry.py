@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3, body_z_axis, euler_matrix, zeros
+from rotorfault.maths.geometry import Mat3, PerRotor, Quat, Vec3, body_z_axis, euler_matrix, zeros
 
 component = st.floats(-100.0, 100.0)
 vectors = st.builds(Vec3, component, component, component)

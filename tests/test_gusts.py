@@ -15,18 +15,18 @@ import pytest
 from numpy.typing import NDArray
 from scipy import linalg, signal
 
-from rotorfault.assembly import assemble, assemble_all
+from rotorfault.base.errors import InputError
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import CHUNK, drive_rows, no_watch
 from rotorfault.engine.noise import FIRST_GUST, GUSTS, SENSOR_NOISE, Noise
 from rotorfault.engine.structure import structure
-from rotorfault.errors import InputError
-from rotorfault.geometry import Vec3, zeros
+from rotorfault.flight.assembly import assemble, assemble_all
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.model.signals import Command
+from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.plant import WINDS, FirstNormals, no_first_normals
-from rotorfault.records import flatten, unflatten
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.signals import Command
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 Array = NDArray[np.float64]
 WIND = slice(SIGNAL_NAMES.index("wind.x"), SIGNAL_NAMES.index("wind.x") + 3)

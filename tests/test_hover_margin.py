@@ -12,13 +12,13 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 import rotorfault as rf
-from rotorfault.allocation.attainable import thrust_available
-from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.records import flatten
-from rotorfault.trim import hover
-from rotorfault.vehicle import Vehicle
+from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+from rotorfault.analysis.trim import hover
+from rotorfault.autopilot.allocation.available import thrust_available
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.records import flatten
+from rotorfault.model.vehicle import Vehicle
 
 SOUND = PerRotor.all(0.0)
 ROTORS = (1, 2, 3, 4)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rotorfault.hover_model import INPUTS, STATES, equations, hover_model
-from rotorfault.vehicle_file import load_vehicle, vehicle_names
+from rotorfault.analysis.hover_model import INPUTS, STATES, equations, hover_model
+from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 
 
 @pytest.mark.parametrize("name", vehicle_names())

@@ -14,13 +14,13 @@ import math
 import numpy as np
 import pytest
 
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import flatten
+from rotorfault.model.signals import Command, Wrench
+from rotorfault.model.vehicle import rotor_speeds
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULTS, PLANTS, WINDS, Air, Plant
 from rotorfault.plant.integrator import rk4
-from rotorfault.records import flatten
-from rotorfault.signals import Command, Wrench
-from rotorfault.vehicle import rotor_speeds
-from rotorfault.vehicle_file import load_vehicle
 
 # Uneven moments of inertia that a body can have, a gain other than 1, and noticeable drag.
 VEHICLE = load_vehicle("paper").vehicle._replace(

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rotorfault.assembly import assemble
-from rotorfault.closed_loop import quiet
-from rotorfault.config import validate
-from rotorfault.control import CONTROLLERS, integral_sliding
-from rotorfault.control.integral_sliding import SwitchingGains, SwitchingSettings
-from rotorfault.control.ismc import Ismc
-from rotorfault.control.protocol import TrackingError
-from rotorfault.control.roismc import Roismc
-from rotorfault.control.sdre import gyroscopic_drift
-from rotorfault.control.smc import SlidingParameters, Smc
-from rotorfault.errors import InputError
-from rotorfault.geometry import Mat3, Vec3, zeros
-from rotorfault.reference import ReferenceTable
-from rotorfault.scenario import scenario_from
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.autopilot.control import CONTROLLERS, integral_sliding
+from rotorfault.autopilot.control.integral_sliding import SwitchingGains, SwitchingSettings
+from rotorfault.autopilot.control.ismc import Ismc
+from rotorfault.autopilot.control.protocol import TrackingError
+from rotorfault.autopilot.control.roismc import Roismc
+from rotorfault.autopilot.control.sdre import gyroscopic_drift
+from rotorfault.autopilot.control.smc import SlidingParameters, Smc
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.flight.assembly import assemble
+from rotorfault.loop.closed_loop import quiet
+from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.reference.sources import ReferenceTable
+from rotorfault.scenario.scenario import scenario_from
 
 Array = NDArray[np.float64]
 VEHICLE = load_vehicle("paper").vehicle

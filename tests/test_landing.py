@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 import rotorfault as rf
-from rotorfault import touchdown
-from rotorfault.assembly import assemble
-from rotorfault.control.landing import Decided, Land, ResponseInputs
+from rotorfault.autopilot.control.landing import Decided, Land, ResponseInputs
 from rotorfault.engine import have_simd
 from rotorfault.engine.structure import structure
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.flight.assembly import assemble
+from rotorfault.loop.scoring import KINDS, REST, Scoring, ScoringParameters
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import unflatten
+from rotorfault.model.signals import Command, Measurement, Reference, healthy
+from rotorfault.model.telemetry import SIGNAL_NAMES, _template
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import PLANTS, WINDS, Ground, Plant
 from rotorfault.plant.plant import PlantState
-from rotorfault.records import unflatten
-from rotorfault.scenario import scenario_from
-from rotorfault.scoring import KINDS, REST, Scoring, ScoringParameters
-from rotorfault.signals import Command, Measurement, Reference, healthy
-from rotorfault.telemetry import SIGNAL_NAMES, _template
-from rotorfault.vehicle import Vehicle
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.results import touchdown
+from rotorfault.scenario.scenario import scenario_from
 
 SCENARIOS = ("land-after-fault", "land-after-fault-hummingbird")
 STILL = Command(PerRotor.all(0.0), zeros())

@@ -12,22 +12,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag, solve_continuous_are
 
-from rotorfault.config import validate
-from rotorfault.control.cascade import (
+from rotorfault.autopilot.control.cascade import (
     AttitudeReference,
     filtered,
 )
-from rotorfault.control.ismc import HurwitzGain, Ismc
-from rotorfault.control.protocol import TrackingError
-from rotorfault.control.riccati import position_gain
-from rotorfault.control.sdre import Sdre, Weights, error_magnitude, gyroscopic_drift, position_gains, sdre_parameters
-from rotorfault.control.smc import MATCH_AT, Smc
-from rotorfault.errors import InputError
-from rotorfault.geometry import Mat3, Vec3, body_z_axis, zeros
+from rotorfault.autopilot.control.ismc import HurwitzGain, Ismc
+from rotorfault.autopilot.control.protocol import TrackingError
+from rotorfault.autopilot.control.riccati import position_gain
+from rotorfault.autopilot.control.sdre import (
+    Sdre,
+    Weights,
+    error_magnitude,
+    gyroscopic_drift,
+    position_gains,
+    sdre_parameters,
+)
+from rotorfault.autopilot.control.smc import MATCH_AT, Smc
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import Mat3, Vec3, body_z_axis, zeros
+from rotorfault.model.signals import Measurement, Reference
+from rotorfault.model.vehicle import gyroscopic_torque
 from rotorfault.plant.models import acceleration, angular_acceleration
 from rotorfault.plant.wind import Air
-from rotorfault.signals import Measurement, Reference
-from rotorfault.vehicle import gyroscopic_torque
 
 # Three different moments of inertia and a heavy rotor: nothing cancels by luck.
 UNEVEN = VEHICLE._replace(inertia=Vec3(0.03, 0.05, 0.06), rotor_inertia=1e-3)

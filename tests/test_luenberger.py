@@ -10,25 +10,25 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import place_poles
 
-from rotorfault.assembly import assemble
-from rotorfault.config import validate
-from rotorfault.diagnosis import DIAGNOSES
-from rotorfault.diagnosis.decision import (
+from rotorfault.autopilot.diagnosis import DIAGNOSES
+from rotorfault.autopilot.diagnosis.decision import (
     DecisionSettings,
 )
-from rotorfault.diagnosis.luenberger import Luenberger, LuenbergerSettings, place
-from rotorfault.diagnosis.protocol import DiagnosisInputs
-from rotorfault.diagnosis.rotor_model import RotorModel, expected_thrust, follow
+from rotorfault.autopilot.diagnosis.luenberger import Luenberger, LuenbergerSettings, place
+from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
+from rotorfault.autopilot.diagnosis.rotor_model import RotorModel, expected_thrust, follow
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.flight.assembly import assemble
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.model.signals import Command, motion_of
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.model.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULTS, PLANTS, WINDS, Plant
-from rotorfault.scenario import scenario_from
-from rotorfault.signals import Command, motion_of
-from rotorfault.telemetry import SIGNAL_NAMES
-from rotorfault.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.scenario.scenario import scenario_from
 
 Array = NDArray[np.float64]
 VEHICLE = load_vehicle("paper").vehicle

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import rotorfault as rf
-from rotorfault import many
+from rotorfault.base.errors import InputError
 from rotorfault.engine import have_simd
-from rotorfault.errors import InputError
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.sweep import assemble_group, checked_columns, groups_of
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.flight import many
+from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 COUNT = 7
 DRAW = np.random.default_rng(3)

@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from rotorfault import metrics
-from rotorfault.dataset import dataset
-from rotorfault.metrics import Outcome
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.results import metrics
+from rotorfault.results.dataset import dataset
+from rotorfault.results.metrics import Outcome
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")

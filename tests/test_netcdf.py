@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 
 import rotorfault as rf
-from rotorfault import dataset, netcdf
-from rotorfault.flight_data import FlightData, flight_data
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.results import dataset, netcdf
+from rotorfault.results.flight_data import FlightData, flight_data
 
 ATTRIBUTES: dict[str, Any] = {
     "format": dataset.FORMAT, "title": "Grüße", "own_controller": "", "seed": 7, "thrust_max": 9.81, "end_time": 0.1,

@@ -11,17 +11,17 @@ from figure_checks import check_nothing_covered, check_units, legend_labels, lin
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
-from rotorfault.dataset import FORMAT, write_netcdf
+from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.plant.wind import PaperWind
 from rotorfault.report import figures as report
 from rotorfault.report import style
 from rotorfault.report.bars import Column, error_figure
 from rotorfault.report.path_figure import _once
 from rotorfault.report.rotor_layout import layout_figure
+from rotorfault.results.dataset import FORMAT, write_netcdf
 from rotorfault.studies.paper import figures
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.runs import Result, Run
-from rotorfault.vehicle_file import load_vehicle, vehicle_names
 
 KEYS = [f"fig{number:02}" for number in range(1, 17)]
 ERRORS = {"fig07": "set-point", "fig11": "sinusoid", "fig16": "square"}

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from rotorfault.dataset import dataset
-from rotorfault.metrics import cost, finite_or_none
-from rotorfault.scenario import load_scenario
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.results.dataset import dataset
+from rotorfault.results.metrics import cost, finite_or_none
+from rotorfault.scenario.scenario import load_scenario
 from rotorfault.studies.paper.measures import chattering, measure
-from rotorfault.telemetry import SIGNAL_NAMES
 
 
 def made_up(scenario: str = "paper-set-point", duration: float = 20.0, dt: float = 0.01, **put: Any) -> xr.Dataset:

@@ -15,13 +15,13 @@ from figure_checks import check_nothing_covered
 from matplotlib.text import Text
 
 import rotorfault as rf
-from rotorfault.cli import app
-from rotorfault.control.riccati import position_gain
-from rotorfault.control.sdre import Weights
-from rotorfault.errors import InputError
-from rotorfault.flight import prepare
-from rotorfault.metrics import finite_or_none
-from rotorfault.scenario import load_scenario, parse_overrides
+from rotorfault.autopilot.control.riccati import position_gain
+from rotorfault.autopilot.control.sdre import Weights
+from rotorfault.base.errors import InputError
+from rotorfault.cli.main import app
+from rotorfault.flight.flight import prepare
+from rotorfault.results.metrics import finite_or_none
+from rotorfault.scenario.scenario import load_scenario, parse_overrides
 from rotorfault.studies.paper import ablation, claims, judges, sensitivity, table1, wind_sweep
 from rotorfault.studies.paper.cases import run_of
 from rotorfault.studies.paper.measures import measure

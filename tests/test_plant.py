@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from rotorfault.config import validate
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.model.signals import Command, Measurement
+from rotorfault.model.vehicle import gyroscopic_torque, hover_thrust
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULTS, PLANTS, SENSORS, WINDS, Normals, Plant, no_noise, rotor_faults
-from rotorfault.records import flatten, leaf_names, unflatten
-from rotorfault.signals import Command, Measurement
-from rotorfault.vehicle import gyroscopic_torque, hover_thrust
-from rotorfault.vehicle_file import load_vehicle
 
 VEHICLE = load_vehicle("paper").vehicle
 NO_DRAG = VEHICLE._replace(linear_drag=0.0)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rotorfault.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.model.signals import Command, Wrench
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULTS, PLANTS, WINDS, Air, Plant
 from rotorfault.plant.integrator import rk4
-from rotorfault.records import flatten, leaf_names, unflatten
-from rotorfault.signals import Command, Wrench
-from rotorfault.vehicle_file import load_vehicle
 
 VEHICLE = load_vehicle("paper").vehicle
 # Three different moments, so that no term of Euler's equations vanishes.

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3
-from rotorfault.records import flatten, leaf_names, select_record, unflatten
-from rotorfault.signals import healthy
+from rotorfault.maths.geometry import Mat3, PerRotor, Quat, Vec3
+from rotorfault.maths.records import flatten, leaf_names, select_record, unflatten
+from rotorfault.model.signals import healthy
 
 
 class Inner(NamedTuple):

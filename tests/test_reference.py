@@ -12,11 +12,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rotorfault.config import validate
-from rotorfault.errors import InputError
-from rotorfault.geometry import Vec3
-from rotorfault.reference import REFERENCES, ReferenceTable
-from rotorfault.signals import Reference
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import Vec3
+from rotorfault.model.signals import Reference
+from rotorfault.reference.sources import REFERENCES, ReferenceTable
 
 Array = NDArray[np.float64]
 H = 1e-4  # s, step of the finite differences here

@@ -26,7 +26,7 @@ from riccati_problems import (
 )
 from scipy.linalg import block_diag, solve_continuous_are, solve_continuous_lyapunov
 
-from rotorfault.control.riccati import (
+from rotorfault.autopilot.control.riccati import (
     AttitudeProblem,
     Gain,
     attitude_problem,
@@ -38,7 +38,7 @@ from rotorfault.control.riccati import (
     residual,
     routh_stable,
 )
-from rotorfault.control.riccati_reference import (
+from rotorfault.autopilot.control.riccati_reference import (
     closed_loop_poles,
     cost_matrix,
     dense_problem,
@@ -46,9 +46,9 @@ from rotorfault.control.riccati_reference import (
     solve_dense,
     solve_iterated,
 )
-from rotorfault.errors import InputError
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.records import flatten, unflatten
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten, unflatten
 
 # --------------------------------------------------------------------------------------------------- closed forms
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from riccati_problems import ONE, broadcast, converged, hostile_starts, one, random_problem
 
-from rotorfault.control.riccati import (
+from rotorfault.autopilot.control.riccati import (
     AttitudeProblem,
     Gain,
     attitude_problem,
@@ -20,12 +20,12 @@ from rotorfault.control.riccati import (
     residual,
     routh_stable,
 )
-from rotorfault.control.riccati_reference import (
+from rotorfault.autopilot.control.riccati_reference import (
     matrix,
     solve_iterated,
 )
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.records import flatten, unflatten
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten, unflatten
 
 # ----------------------------------------------------------------------------------------------------- chord step
 

@@ -9,17 +9,23 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rotorfault.control.cascade import Cascade
-from rotorfault.control.ismc import Ismc
-from rotorfault.control.protocol import CONTROLLERS
-from rotorfault.control.python_controller import PythonController
-from rotorfault.geometry import Vec3, zeros
-from rotorfault.linearisation import linearise
-from rotorfault.sampled_data import AxisGains, damping, sampled_data_check, sampled_data_warnings, sampled_poles
-from rotorfault.scenario import load_scenario
-from rotorfault.signals import Measurement, Reference, Wrench
-from rotorfault.trim import hover_loop
-from rotorfault.vehicle import Vehicle
+from rotorfault.analysis.linearisation import linearise
+from rotorfault.analysis.sampling_check import (
+    AxisGains,
+    damping,
+    sampled_data_check,
+    sampled_data_warnings,
+    sampled_poles,
+)
+from rotorfault.analysis.trim import hover_loop
+from rotorfault.autopilot.control.cascade import Cascade
+from rotorfault.autopilot.control.ismc import Ismc
+from rotorfault.autopilot.control.protocol import CONTROLLERS
+from rotorfault.autopilot.control.python_controller import PythonController
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.model.signals import Measurement, Reference, Wrench
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.scenario.scenario import load_scenario
 
 
 @pytest.mark.parametrize("direct", [False, True])

@@ -1,4 +1,4 @@
-"""Every function of `rotorfault.scalar`, on every number type, with ordinary numbers, edges and NaN."""
+"""Every function of `rotorfault.maths.scalar`, on every number type, with ordinary numbers, edges and NaN."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotorfault import scalar
+from rotorfault.maths import scalar
 
 NAN, INF = math.nan, math.inf
 

@@ -38,7 +38,7 @@ def loaded(code: str, cwd: Path | None = None) -> set[str]:
 
 def command(*arguments: str) -> str:
     """Code that runs a command of the command line."""
-    return f"from rotorfault import cli\ncli.app({list(arguments)!r}, standalone_mode=False)"
+    return f"from rotorfault.cli import main\nmain.app({list(arguments)!r}, standalone_mode=False)"
 
 
 def test_the_package_alone_loads_nothing() -> None:

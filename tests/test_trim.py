@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rotorfault.allocation.hover import critical_loss, hover_margin, torque_reserve
-from rotorfault.assembly import assemble
-from rotorfault.attainable_hover import parse_losses
-from rotorfault.closed_loop import Start, quiet
-from rotorfault.control.protocol import CONTROLLERS
-from rotorfault.control.python_controller import PythonController
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3, zeros
-from rotorfault.linearisation import AXES, LinearLoop, linearise
-from rotorfault.margins import Margins, margins
-from rotorfault.scenario import load_scenario
-from rotorfault.signals import Command, Measurement, Reference, Wrench
-from rotorfault.trim import hover, hover_loop, trim_report
-from rotorfault.vehicle import Vehicle, wrench_of
+from rotorfault.analysis.attainable import parse_losses
+from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
+from rotorfault.analysis.linearisation import AXES, LinearLoop, linearise
+from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.trim import hover, hover_loop, trim_report
+from rotorfault.autopilot.control.protocol import CONTROLLERS
+from rotorfault.autopilot.control.python_controller import PythonController
+from rotorfault.base.errors import InputError
+from rotorfault.flight.assembly import assemble
+from rotorfault.loop.closed_loop import Start, quiet
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.model.signals import Command, Measurement, Reference, Wrench
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.scenario.scenario import load_scenario
 
 T = 0.002
 HOVER = Reference(zeros(), zeros(), zeros(), 0.0, 0.0, 0.0)

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.config import parse_toml, validate
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3
-from rotorfault.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
-from rotorfault.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
+from rotorfault.base.config import parse_toml, validate
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
+from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
 BUILT_IN = ("crazyflie-2.1", "hummingbird", "paper", "paper-arm-0225", "paper-iz-33e-4")
 

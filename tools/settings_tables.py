@@ -21,13 +21,13 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
-from rotorfault.catalogue import REGISTRIES
-from rotorfault.control.cascade import CascadeSettings
-from rotorfault.geometry import Mat3, PerRotor, Vec3
-from rotorfault.scenario import Mismatch, Part, Scenario, Start
-from rotorfault.telemetry import RPY, quantities
-from rotorfault.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
+from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+from rotorfault.autopilot.control.cascade import CascadeSettings
+from rotorfault.cli.catalogue import REGISTRIES
+from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
+from rotorfault.model.telemetry import RPY, quantities
+from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
+from rotorfault.scenario.scenario import Mismatch, Part, Scenario, Start
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)

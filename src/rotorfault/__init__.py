@@ -18,55 +18,61 @@ from typing import TYPE_CHECKING, Any
 from rotorfault._version import __version__
 
 if TYPE_CHECKING:
-    from rotorfault.allocation.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.analysis.trim import trim_report
+    from rotorfault.autopilot.control.protocol import (
+        CONTROLLERS,
+        ControlInputs,
+        Controller,
+        ControlOutput,
+        no_telemetry,
+    )
+    from rotorfault.base.errors import InputError
     from rotorfault.campaigns.api import Campaign, campaign
-    from rotorfault.control.protocol import CONTROLLERS, ControlInputs, Controller, ControlOutput, no_telemetry
-    from rotorfault.errors import InputError
-    from rotorfault.flight import Flight, fly, fly_all, load, repeat
-    from rotorfault.geometry import Mat3, PerRotor, Quat, Vec3
-    from rotorfault.many import Flights, fly_many
-    from rotorfault.neighbours import neighbour
-    from rotorfault.scenario import Scenario, load_scenario, scenario_names
-    from rotorfault.signals import Measurement, Reference, Wrench
-    from rotorfault.trim import trim_report
-    from rotorfault.vehicle import Vehicle
-    from rotorfault.vehicle_file import load_vehicle, vehicle_names
+    from rotorfault.flight.flight import Flight, fly, fly_all, load, repeat
+    from rotorfault.flight.many import Flights, fly_many
+    from rotorfault.maths.geometry import Mat3, PerRotor, Quat, Vec3
+    from rotorfault.model.signals import Measurement, Reference, Wrench
+    from rotorfault.model.vehicle import Vehicle
+    from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
+    from rotorfault.scenario.neighbours import neighbour
+    from rotorfault.scenario.scenario import Scenario, load_scenario, scenario_names
 
 _HOME = {
-    "CONTROLLERS": "control.protocol",
+    "CONTROLLERS": "autopilot.control.protocol",
     "Campaign": "campaigns.api",
-    "ControlInputs": "control.protocol",
-    "ControlOutput": "control.protocol",
-    "Controller": "control.protocol",
-    "Flight": "flight",
-    "Flights": "many",
-    "InputError": "errors",
-    "Mat3": "geometry",
-    "Measurement": "signals",
-    "PerRotor": "geometry",
-    "Quat": "geometry",
-    "Reference": "signals",
-    "Scenario": "scenario",
-    "Vec3": "geometry",
-    "Vehicle": "vehicle",
-    "Wrench": "signals",
-    "critical_loss": "allocation.hover",
-    "critical_pair": "allocation.hover",
+    "ControlInputs": "autopilot.control.protocol",
+    "ControlOutput": "autopilot.control.protocol",
+    "Controller": "autopilot.control.protocol",
+    "Flight": "flight.flight",
+    "Flights": "flight.many",
+    "InputError": "base.errors",
+    "Mat3": "maths.geometry",
+    "Measurement": "model.signals",
+    "PerRotor": "maths.geometry",
+    "Quat": "maths.geometry",
+    "Reference": "model.signals",
+    "Scenario": "scenario.scenario",
+    "Vec3": "maths.geometry",
+    "Vehicle": "model.vehicle",
+    "Wrench": "model.signals",
+    "critical_loss": "analysis.hover",
+    "critical_pair": "analysis.hover",
     "campaign": "campaigns.api",
-    "fly": "flight",
-    "fly_all": "flight",
-    "fly_many": "many",
-    "hover_margin": "allocation.hover",
-    "load": "flight",
-    "load_scenario": "scenario",
-    "load_vehicle": "vehicle_file",
-    "neighbour": "neighbours",
-    "no_telemetry": "control.protocol",
-    "repeat": "flight",
-    "scenario_names": "scenario",
-    "torque_reserve": "allocation.hover",
-    "trim_report": "trim",
-    "vehicle_names": "vehicle_file",
+    "fly": "flight.flight",
+    "fly_all": "flight.flight",
+    "fly_many": "flight.many",
+    "hover_margin": "analysis.hover",
+    "load": "flight.flight",
+    "load_scenario": "scenario.scenario",
+    "load_vehicle": "model.vehicle_file",
+    "neighbour": "scenario.neighbours",
+    "no_telemetry": "autopilot.control.protocol",
+    "repeat": "flight.flight",
+    "scenario_names": "scenario.scenario",
+    "torque_reserve": "analysis.hover",
+    "trim_report": "analysis.trim",
+    "vehicle_names": "model.vehicle_file",
 }
 
 __all__ = [

@@ -26,13 +26,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.assembly import assemble, initial_state, start_of
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Array, Batch, Recording, no_watch
 from rotorfault.engine.taylor import fly_taylor
-from rotorfault.records import leaf_names
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.telemetry import SIGNAL_NAMES
+from rotorfault.flight.assembly import assemble, initial_state, start_of
+from rotorfault.maths.records import leaf_names
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 Say = Callable[[str], None]
 

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from rotorfault.errors import InputError
+from rotorfault.base.errors import InputError
 from rotorfault.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, STYLE, VERMILION, new_figure
 
 OURS = "rotorfault RK4"

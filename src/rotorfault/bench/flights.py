@@ -22,10 +22,10 @@ import numpy as np
 
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Batch, no_watch
-from rotorfault.flight import fly
-from rotorfault.many import fly_many
-from rotorfault.scenario import Scenario, load_scenario
-from rotorfault.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.flight.flight import fly
+from rotorfault.flight.many import fly_many
+from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.scenario.scenario import Scenario, load_scenario
 
 SIZES = (100, 1_000, 10_000)
 PERIOD = 1e-3  # s, of sampling and integration

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from rotorfault.assembly import assemble
 from rotorfault.bench.flights import scenario
 from rotorfault.engine.batch import Batch, columns, no_reference
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.engine.machine import aligned, grouped
 from rotorfault.engine.native import lanes
-from rotorfault.geometry import PerRotor
-from rotorfault.records import flatten, unflatten
+from rotorfault.flight.assembly import assemble
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.records import flatten, unflatten
 
 
 def measure(quick: bool = False) -> dict[str, Any]:

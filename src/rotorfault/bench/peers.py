@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from rotorfault.errors import InputError
+from rotorfault.base.errors import InputError
 
 SCRIPTS: Final = Path(__file__).parent / "peer_scripts"
 STAMP: Final = "complete.json"

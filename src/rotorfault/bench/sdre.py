@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag, solve_continuous_are
 
-from rotorfault.control.riccati import AttitudeProblem, Gain, attitude_problem, fly, guaranteed_gain
-from rotorfault.control.riccati_reference import cost_matrix, dense_problem
-from rotorfault.control.sdre import (
+from rotorfault.autopilot.control.riccati import AttitudeProblem, Gain, attitude_problem, fly, guaranteed_gain
+from rotorfault.autopilot.control.riccati_reference import cost_matrix, dense_problem
+from rotorfault.autopilot.control.sdre import (
     SdreParameters,
     Weights,
     error_magnitude,
@@ -31,15 +31,15 @@ from rotorfault.control.sdre import (
     position_gains,
     sdre_parameters,
 )
+from rotorfault.autopilot.presets import preset
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.engine.machine import grouped
 from rotorfault.engine.native import lanes
-from rotorfault.geometry import Mat3, Vec3
-from rotorfault.presets import preset
-from rotorfault.records import flatten, unflatten
-from rotorfault.scalar import Scalar
-from rotorfault.vehicle import Vehicle
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_file import load_vehicle
 
 Matrix = npt.NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
     -------
     dict
         ``steps``: Newton-Kleinman steps from the guaranteed gain to a residual of 1e-12 in the worst problem.
-        ``own_residual``: that residual, `rotorfault.control.riccati.residual`, after those steps.
+        ``own_residual``: that residual, `rotorfault.autopilot.control.riccati.residual`, after those steps.
         ``batch``: problems per call of the compiled batch. ``in_flight_us``: one warm step with residual and test of
         stability, as a flight makes it, per problem of a batch. ``one_blas_thread``: whether OPENBLAS_NUM_THREADS is
         1; else the packages' times are several times too long and the factors below flatter.

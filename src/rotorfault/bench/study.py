@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from rotorfault._version import __version__
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import write_atomically
 from rotorfault.bench import flights, latency, peers
 from rotorfault.bench.peak import peak_flops
 from rotorfault.engine import have_simd
 from rotorfault.engine.machine import Machines
-from rotorfault.errors import InputError
-from rotorfault.files import write_atomically
 
 Say = Callable[[str], None]
 FLOPS = {"fma": 2, "fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1}

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, final
 
 import pyarrow as pa
 
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import replay
-from rotorfault.campaigns.store import Store
+from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
-from rotorfault.errors import InputError
-from rotorfault.flight import Flight
+from rotorfault.flight.flight import Flight
 
 if TYPE_CHECKING:
-    from rotorfault.campaigns.maps import Maps
+    from rotorfault.campaigns.report.maps import Maps
 
 Say = Callable[[str], None]
 
@@ -45,13 +45,13 @@ class Campaign:
         return self._store.table()
 
     def maps(self) -> Maps:
-        """Survival, intervals, grades, differences by cell; see `rotorfault.campaigns.maps`."""
-        found: Maps = importlib.import_module("rotorfault.campaigns.maps").maps(self.study, self.table())
+        """Survival, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
+        found: Maps = importlib.import_module("rotorfault.campaigns.report.maps").maps(self.study, self.table())
         return found
 
     def report(self) -> list[Path]:
         """Write pictures and page; the page's path first."""
-        made: list[Path] = importlib.import_module("rotorfault.campaigns.report").write(
+        made: list[Path] = importlib.import_module("rotorfault.campaigns.report.report").write(
             self.study, self.table(), self.folder, self._store.identity.versions
         )
         return made

@@ -8,13 +8,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.grades import grades
-from rotorfault.campaigns.plan import Flights, drawn, identifier, seeds
+from rotorfault.campaigns.sampling.axes import columns
+from rotorfault.campaigns.sampling.plan import Flights, drawn, identifier, seeds
 from rotorfault.campaigns.study import Study
-from rotorfault.many import fly_many
-from rotorfault.metrics import SURVIVED as IN_ONE_PIECE
-from rotorfault.score_table import ScoreTable
+from rotorfault.flight.many import fly_many
+from rotorfault.results.metrics import SURVIVED as IN_ONE_PIECE
+from rotorfault.results.score_table import ScoreTable
 
 RECOVERED = 0.25  # m: within it a vehicle counts as back where it should be
 
@@ -45,7 +45,7 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
     -------
     pyarrow.Table
         One row per flight in order: ``flight`` (within the block), ``id`` (within the campaign, see
-        `rotorfault.campaigns.plan.identifier`), ``variant``, ``cell``, ``number``, axes and draws by name, ``seed``,
+        `rotorfault.campaigns.sampling.plan.identifier`), ``variant``, ``cell``, ``number``, axes and draws by name, ``seed``,
         ``grade``, ``survived``, ``outcome``, ``recovery_time`` [s], ``altitude_lost`` [m], and `METRICS`.
 
     Raises

@@ -9,11 +9,11 @@ from typing import Any, final
 import pyarrow as pa
 from distributed import Client, as_completed
 
+from rotorfault.base.errors import InputError
+from rotorfault.base.versions import source_digest
 from rotorfault.campaigns.block import fly_block
-from rotorfault.campaigns.plan import Flights
+from rotorfault.campaigns.sampling.plan import Flights
 from rotorfault.campaigns.study import Study, study_from
-from rotorfault.errors import InputError
-from rotorfault.versions import source_digest
 
 PATIENCE = 10.0  # s to reach the scheduler
 

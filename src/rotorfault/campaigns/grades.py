@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.score_table import ScoreTable
+from rotorfault.results.score_table import ScoreTable
 
 GRADES = ("tracked", "yaw given up", "degraded", "controlled descent", "ground", "tumbled", "diverged")
 SURVIVED = GRADES[:3]

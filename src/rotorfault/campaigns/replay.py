@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotorfault.campaigns.axes import columns
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns.block import vary
-from rotorfault.campaigns.plan import Flights, identified, seeds
+from rotorfault.campaigns.sampling.axes import columns
+from rotorfault.campaigns.sampling.plan import Flights, identified, seeds
 from rotorfault.campaigns.study import Study
-from rotorfault.errors import InputError
-from rotorfault.flight import Flight, fly
+from rotorfault.flight.flight import Flight, fly
 
 
 def settings_of(study: Study, flight: Flights) -> dict[str, Any]:

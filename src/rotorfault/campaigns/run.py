@@ -17,15 +17,15 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import pyarrow as pa
 
-from rotorfault.campaigns.axes import columns
+from rotorfault.base.errors import InputError
+from rotorfault.base.progress import Bar
+from rotorfault.base.versions import source_digest
 from rotorfault.campaigns.block import fly_block, vary
-from rotorfault.campaigns.plan import Counts, Flights, blocks, next_round
-from rotorfault.campaigns.store import Store
+from rotorfault.campaigns.sampling.axes import columns
+from rotorfault.campaigns.sampling.plan import Counts, Flights, blocks, next_round
+from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study
-from rotorfault.errors import InputError
-from rotorfault.progress import Bar
-from rotorfault.sweep import assemble_group, checked_columns, groups_of
-from rotorfault.versions import source_digest
+from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
 
 BYTES_PER_FLIGHT = 400
 Say = Callable[[str], None]
@@ -70,7 +70,7 @@ def open_store(study: Study, folder: Path, resume: bool, repair: bool = False) -
     Raises
     ------
     InputError
-        See `rotorfault.campaigns.store.Store`.
+        See `rotorfault.campaigns.store.store.Store`.
     """
     tables, digest = study.as_tables(), source_digest()
     if resume or repair:

@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from rotorfault.campaigns.axes import AXES, axis
+from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
+from rotorfault.base.errors import InputError
+from rotorfault.base.registry import unknown
 from rotorfault.campaigns.grades import GRADES, SURVIVED
-from rotorfault.campaigns.refine import Refinement, looks
+from rotorfault.campaigns.sampling.axes import AXES, axis
+from rotorfault.campaigns.sampling.refine import Refinement, looks
 from rotorfault.campaigns.studies import FOLDER, study_names
-from rotorfault.config import Strict, parse_toml, read_text, refusal, validate
-from rotorfault.errors import InputError
-from rotorfault.registry import unknown
-from rotorfault.scenario import Scenario, load_scenario, override_all, scenario_from
-from rotorfault.vehicle_file import load_vehicle
+from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.scenario.scenario import Scenario, load_scenario, override_all, scenario_from
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000
@@ -107,7 +107,7 @@ class Variant(Strict):
 
 
 class Refine(Strict):
-    """How many flights a cell gets; see `rotorfault.campaigns.refine.Refinement`."""
+    """How many flights a cell gets; see `rotorfault.campaigns.sampling.refine.Refinement`."""
 
     initial: int = Field(default=24, ge=1, description="flights of a variant in each cell in the first round")
     block: int = Field(default=24, ge=1, description="further flights in a round, at least")

@@ -9,9 +9,9 @@ import importlib
 import importlib.util
 from typing import cast
 
+from rotorfault.base.errors import InputError
+from rotorfault.base.registry import unknown
 from rotorfault.engine.batch import Engine
-from rotorfault.errors import InputError
-from rotorfault.registry import unknown
 
 ENGINES = {
     "simd": (

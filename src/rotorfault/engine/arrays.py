@@ -17,7 +17,7 @@ from rotorfault.engine.batch import (
     no_watch,
     recorded,
 )
-from rotorfault.records import unflatten
+from rotorfault.maths.records import unflatten
 
 
 def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:

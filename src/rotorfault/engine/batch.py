@@ -8,13 +8,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
 from rotorfault.engine.noise import GUSTS, SENSOR_NOISE, Noise, Stream
-from rotorfault.geometry import zeros
+from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.maths.geometry import zeros
+from rotorfault.maths.records import flatten, leaf_names
+from rotorfault.model.signals import Reference
+from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.plant.sensors import no_noise
-from rotorfault.records import flatten, leaf_names
-from rotorfault.signals import Reference
-from rotorfault.telemetry import SIGNAL_NAMES
 
 Array = NDArray[np.float64]
 CHUNK = 500  # steps between two looks at progress, noise and flights that are over

@@ -19,10 +19,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotorfault.closed_loop import ClosedLoop
+from rotorfault.base.files import write_atomically
 from rotorfault.engine.program import Layout
 from rotorfault.engine.structure import parts_of, structure
-from rotorfault.files import write_atomically
+from rotorfault.loop.closed_loop import ClosedLoop
 
 KEEP = 200  # compiled loops on disk
 _SUM_LENGTH = hashlib.sha256().digest_size

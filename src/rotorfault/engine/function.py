@@ -14,7 +14,7 @@ from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.machine import aligned, grouped, ungrouped
 from rotorfault.engine.trace import Tape
-from rotorfault.records import flatten, unflatten
+from rotorfault.maths.records import flatten, unflatten
 
 
 @final

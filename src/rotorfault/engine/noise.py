@@ -36,7 +36,7 @@ class Stream(NamedTuple):
 
 
 SENSOR_NOISE = Stream(12, 0)  # `rotorfault.plant.sensors.Normals`
-GUSTS = Stream(3, 1)  # `rotorfault.closed_loop.Drive.gust`
+GUSTS = Stream(3, 1)  # `rotorfault.loop.closed_loop.Drive.gust`
 FIRST_GUST = Stream(6, 2)  # `rotorfault.plant.wind.FirstNormals`, at step 0 only
 
 

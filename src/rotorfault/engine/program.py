@@ -26,9 +26,9 @@ from rotorfault.engine.batch import Batch, as_drive, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
-from rotorfault.geometry import PerRotor, zeros
-from rotorfault.records import flatten, leaf_names, unflatten
-from rotorfault.signals import Command
+from rotorfault.maths.geometry import PerRotor, zeros
+from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.model.signals import Command
 
 SEED = ("seed", "index")  # rows after the parameters
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds

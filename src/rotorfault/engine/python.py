@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotorfault.closed_loop import LoopState
 from rotorfault.engine.batch import (
     Array,
     Batch,
@@ -19,8 +18,9 @@ from rotorfault.engine.batch import (
     no_watch,
     recorded,
 )
-from rotorfault.records import flatten, unflatten
-from rotorfault.telemetry import SIGNAL_NAMES, Signals
+from rotorfault.loop.closed_loop import LoopState
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.model.telemetry import SIGNAL_NAMES, Signals
 
 
 def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:

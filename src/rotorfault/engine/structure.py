@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from rotorfault.closed_loop import ClosedLoop
-from rotorfault.geometry import Value
+from rotorfault.loop.closed_loop import ClosedLoop
+from rotorfault.maths.geometry import Value
 
 
 def structure(loop: ClosedLoop) -> tuple[str, ...]:

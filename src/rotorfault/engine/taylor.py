@@ -17,15 +17,15 @@ from __future__ import annotations
 import importlib
 from typing import Any, cast, final
 
-from rotorfault.closed_loop import ClosedLoop
+from rotorfault.base.errors import InputError
 from rotorfault.engine import python
 from rotorfault.engine.batch import Batch, Recording, Watch, no_watch
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, zeros
+from rotorfault.loop.closed_loop import ClosedLoop
+from rotorfault.maths.geometry import PerRotor, zeros
+from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Command
 from rotorfault.plant.plant import Motion, Plant, PlantParameters, PlantState
-from rotorfault.records import flatten, leaf_names, unflatten
-from rotorfault.scalar import Scalar
-from rotorfault.signals import Command
 
 TOLERANCE = 1e-16  # relative to the largest coordinate, in each Taylor step
 

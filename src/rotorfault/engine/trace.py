@@ -1,6 +1,6 @@
 """Terms: the symbols on which the closed loop is run once, so that only its arithmetic is kept.
 
-A `Term` carries + - * / and the functions of `rotorfault.scalar`. Equal operations on equal arguments are the same
+A `Term` carries + - * / and the functions of `rotorfault.maths.scalar`. Equal operations on equal arguments are the same
 term, so what several equations share is computed once. Each term knows its *level*: 0 a number, 1 a function of the
 flight's parameters alone, 2 anything that changes during a flight. Terms of level 1 are computed once per flight,
 before it begins (see `rotorfault.engine.program`).
@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Union
 
-from rotorfault import scalar
+from rotorfault.maths import scalar
 
 Operand = Union["Term", float]
 
@@ -88,7 +88,7 @@ class Term:
         return f"{self.op}({inside})"
 
     def __bool__(self) -> bool:
-        raise TypeError("a symbol has no truth value; use rotorfault.scalar.select instead of 'if'")
+        raise TypeError("a symbol has no truth value; use rotorfault.maths.scalar.select instead of 'if'")
 
     @property
     def truth(self) -> bool:
@@ -206,7 +206,7 @@ def _ordered(a: Term, b: Term) -> tuple[Term, Term]:
     return (a, b) if a.index <= b.index else (b, a)
 
 
-# ------------------------------------------------------------------------------ what `rotorfault.scalar` calls
+# ------------------------------------------------------------------------------ what `rotorfault.maths.scalar` calls
 
 
 def _tape_of(*arguments: Operand) -> Tape:
@@ -214,7 +214,7 @@ def _tape_of(*arguments: Operand) -> Tape:
 
 
 def function(name: str, *arguments: Operand) -> Term:
-    """A function of `rotorfault.scalar` of terms and numbers."""
+    """A function of `rotorfault.maths.scalar` of terms and numbers."""
     tape = _tape_of(*arguments)
     lifted = [tape.lift(argument) for argument in arguments]
     numbers = [term.value for term in lifted]

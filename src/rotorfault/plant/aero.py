@@ -7,8 +7,8 @@ The paper gives no force law for its wind of fixed velocity; this is the reading
 
 from __future__ import annotations
 
-from rotorfault.geometry import Vec3
-from rotorfault.vehicle import Vehicle
+from rotorfault.maths.geometry import Vec3
+from rotorfault.model.vehicle import Vehicle
 
 
 def drag_acceleration(vehicle: Vehicle, v_W: Vec3, wind_W: Vec3) -> Vec3:

@@ -43,10 +43,10 @@ from typing import ClassVar, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.config import Strict
-from rotorfault.geometry import Vec3, zeros
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.scalar import Scalar, exp, maximum, sqrt
 from rotorfault.plant.wind import WINDS, Air, FirstNormals, Wind
-from rotorfault.scalar import Scalar, exp, maximum, sqrt
 
 FOOT = 0.3048  # m
 

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, Protocol, final
 
 from pydantic import Field, model_validator
 
-from rotorfault.config import Strict, refusal
-from rotorfault.geometry import PerRotor
-from rotorfault.registry import Registry
-from rotorfault.scalar import (
+from rotorfault.base.config import Strict, refusal
+from rotorfault.base.registry import Registry
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import (
     Scalar,
     absolute,
     both,

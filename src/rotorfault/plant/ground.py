@@ -22,10 +22,10 @@ from __future__ import annotations
 
 from typing import NamedTuple, final
 
-from rotorfault.geometry import Vec3, euler_matrix
-from rotorfault.scalar import Scalar, maximum, sqrt
-from rotorfault.signals import Measurement
-from rotorfault.vehicle import Vehicle
+from rotorfault.maths.geometry import Vec3, euler_matrix
+from rotorfault.maths.scalar import Scalar, maximum, sqrt
+from rotorfault.model.signals import Measurement
+from rotorfault.model.vehicle import Vehicle
 
 SAG = 0.002  # m: how far the feet sink under the weight
 DAMPING = 4.0  # s/m: a of Hunt and Crossley; no bounce is faster than 0.25 m/s

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from rotorfault.records import flatten, unflatten
-from rotorfault.scalar import Scalar
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.maths.scalar import Scalar
 
 R = TypeVar("R")
 

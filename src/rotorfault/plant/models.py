@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from rotorfault.geometry import Vec3
+from rotorfault.base.registry import Registry
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Measurement, Wrench
+from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
 from rotorfault.plant.aero import drag_acceleration
 from rotorfault.plant.wind import Air
-from rotorfault.registry import Registry
-from rotorfault.scalar import Scalar
-from rotorfault.signals import Measurement, Wrench
-from rotorfault.vehicle import Vehicle, gyroscopic_torque
 
 
 class BodyModel(Protocol):

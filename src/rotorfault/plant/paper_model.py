@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from typing import NamedTuple, final
 
-from rotorfault.geometry import Vec3, body_z_axis
+from rotorfault.maths.geometry import Vec3, body_z_axis
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Measurement, Wrench
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.plant.models import PLANTS, acceleration, angular_acceleration
 from rotorfault.plant.wind import Air
-from rotorfault.scalar import Scalar
-from rotorfault.signals import Measurement, Wrench
-from rotorfault.vehicle import Vehicle
 
 
 class PaperState(NamedTuple):

@@ -11,8 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, final
 
-from rotorfault.errors import InputError
-from rotorfault.geometry import PerRotor, Vec3
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Command, Measurement, Wrench
+from rotorfault.model.vehicle import Vehicle, residual_speed, wrench_of
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.integrator import rk4
@@ -25,9 +28,6 @@ from rotorfault.plant.rotors import (
     true_rotor_speeds,
 )
 from rotorfault.plant.wind import Air, Wind
-from rotorfault.scalar import Scalar
-from rotorfault.signals import Command, Measurement, Wrench
-from rotorfault.vehicle import Vehicle, residual_speed, wrench_of
 
 
 class PlantParameters(NamedTuple):

@@ -10,10 +10,10 @@ A stuck rotor spins at the speed that gives its fixed thrust.
 
 from __future__ import annotations
 
-from rotorfault.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import clip, maximum, select
+from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.plant.faults import RotorFault
-from rotorfault.scalar import clip, maximum, select
-from rotorfault.vehicle import Vehicle, rotor_speeds
 
 # Below this share of the greatest thrust no share of it can be named.
 _LEAST_SHARE = 0.05

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, NamedTuple, Protocol, final
 
 from pydantic import Field
 
-from rotorfault.config import Strict
-from rotorfault.geometry import Vec3, zeros
-from rotorfault.registry import Registry
-from rotorfault.scalar import Scalar
-from rotorfault.signals import Measurement
+from rotorfault.base.config import Strict
+from rotorfault.base.registry import Registry
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Measurement
 
 
 class Normals(NamedTuple):

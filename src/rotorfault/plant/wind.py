@@ -13,10 +13,10 @@ from typing import Any, ClassVar, NamedTuple, Protocol, final
 
 from pydantic import Field
 
-from rotorfault.config import Strict
-from rotorfault.geometry import Vec3, zeros
-from rotorfault.registry import Registry
-from rotorfault.scalar import Scalar, sin
+from rotorfault.base.config import Strict
+from rotorfault.base.registry import Registry
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.scalar import Scalar, sin
 
 
 class Air(NamedTuple):

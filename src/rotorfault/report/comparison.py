@@ -8,9 +8,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from rotorfault.flight import Flight, load
+from rotorfault.flight.flight import Flight, load
 from rotorfault.report import figures
-from rotorfault.report.text import comparison
+from rotorfault.results.text import comparison
 
 
 def labelled(paths: Sequence[Path]) -> dict[str, Flight]:

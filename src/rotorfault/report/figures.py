@@ -18,8 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from rotorfault.errors import InputError
-from rotorfault.files import output_folder, write_atomically
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import output_folder, write_atomically
 from rotorfault.report.detection_figure import detection_figure
 from rotorfault.report.panels import (
     REFERENCE,
@@ -50,7 +50,7 @@ def draw(data: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     Parameters
     ----------
     data : Dataset or mapping of str to Dataset
-        Flights as `rotorfault.dataset.dataset` makes them; the keys of a mapping stand in the legends.
+        Flights as `rotorfault.results.dataset.dataset` makes them; the keys of a mapping stand in the legends.
 
     Returns
     -------

@@ -19,8 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from rotorfault.errors import InputError
-from rotorfault.metrics import Outcome
+from rotorfault.base.errors import InputError
 from rotorfault.report.style import (
     BLACK,
     COLOURS,
@@ -35,6 +34,7 @@ from rotorfault.report.style import (
     span,
     unit,
 )
+from rotorfault.results.metrics import Outcome
 
 ROOM = 0.98  # share of the width that a legend may take
 REACH = 3.0  # spans by which a panel may exceed its core before it is cut

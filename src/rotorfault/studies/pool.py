@@ -9,8 +9,8 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 
-from rotorfault.errors import InputError
-from rotorfault.progress import Bar
+from rotorfault.base.errors import InputError
+from rotorfault.base.progress import Bar
 from rotorfault.studies.runs import Measure, Run, Store
 
 _store: Store | None = None

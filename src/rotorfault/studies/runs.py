@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from rotorfault.errors import InputError
-from rotorfault.files import write_atomically
-from rotorfault.flight import fly, load
-from rotorfault.metrics import finite_or_none
-from rotorfault.scenario import Scenario, load_scenario
-from rotorfault.versions import source_digest
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import write_atomically
+from rotorfault.base.versions import source_digest
+from rotorfault.flight.flight import fly, load
+from rotorfault.results.metrics import finite_or_none
+from rotorfault.scenario.scenario import Scenario, load_scenario
 
 Measure = Callable[[xr.Dataset], dict[str, Any]]
 

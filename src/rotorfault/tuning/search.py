@@ -12,11 +12,11 @@ import cma
 import numpy as np
 
 from rotorfault._version import __version__
-from rotorfault.assembly import assemble_all
+from rotorfault.base.errors import InputError
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Array, no_watch
-from rotorfault.errors import InputError
-from rotorfault.scenario import Scenario
+from rotorfault.flight.assembly import assemble_all
+from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.space import SPACES, settings_at
 from rotorfault.tuning.training import objective, training_groups
 

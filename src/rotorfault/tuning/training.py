@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 from rotorfault.engine.batch import Array
-from rotorfault.metrics import cost, first_loss
-from rotorfault.neighbours import neighbour
-from rotorfault.scenario import Scenario, load_scenario
-from rotorfault.telemetry import SIGNAL_NAMES, quantities
+from rotorfault.model.telemetry import SIGNAL_NAMES, quantities
+from rotorfault.results.metrics import cost, first_loss
+from rotorfault.scenario.neighbours import neighbour
+from rotorfault.scenario.scenario import Scenario, load_scenario
 
 LOST = 10.0
 BAND = 0.02
@@ -113,7 +113,7 @@ def _settling(error: Array, times: Array, onset: float, k: int) -> float:
 
 
 def columns(signals: Array, times: Array) -> Any:
-    """Records by name, in the shape that `rotorfault.metrics` reads them, without the cost of a dataset."""
+    """Records by name, in the shape that `rotorfault.results.metrics` reads them, without the cost of a dataset."""
     found: dict[str, Any] = {"time": SimpleNamespace(values=times)}
     row = 0
     for name in quantities():

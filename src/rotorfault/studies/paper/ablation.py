@@ -22,13 +22,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorfault.control.ismc import IsmcSettings
-from rotorfault.control.riccati import position_gain
-from rotorfault.control.roismc import RoismcSettings
-from rotorfault.control.sdre import Weights, position_gains, sdre_parameters
-from rotorfault.files import write_atomically
-from rotorfault.geometry import zeros
-from rotorfault.scenario import load_scenario
+from rotorfault.autopilot.control.ismc import IsmcSettings
+from rotorfault.autopilot.control.riccati import position_gain
+from rotorfault.autopilot.control.roismc import RoismcSettings
+from rotorfault.autopilot.control.sdre import Weights, position_gains, sdre_parameters
+from rotorfault.base.files import write_atomically
+from rotorfault.maths.geometry import zeros
+from rotorfault.scenario.scenario import load_scenario
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.grid_figure import grid_figure
 from rotorfault.studies.paper.verdicts import stays

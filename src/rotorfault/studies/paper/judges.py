@@ -239,7 +239,7 @@ def gusts_seen(windy: Result, calm: Result) -> list[Reading]:
 
 
 def accurate(*flown: Result) -> list[Reading]:
-    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.metrics`."""
+    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.results.metrics`."""
     ends = [f"{r.run.id} {r.summary['outcome']}" for r in flown]
     return [Reading("", ", ".join(ends), all(r.summary["outcome"] in ("settled", "tracked") for r in flown))]
 

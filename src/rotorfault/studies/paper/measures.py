@@ -15,11 +15,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from rotorfault.geometry import PerRotor
-from rotorfault.metrics import attitude_error, cost
-from rotorfault.scenario import Scenario, scenario_from
-from rotorfault.scoring import SETTLED
-from rotorfault.vehicle import Vehicle, wrench_of
+from rotorfault.loop.scoring import SETTLED
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.results.metrics import attitude_error, cost
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 LABEL = "1"  # version of what `measure` gives
 

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, StrictUndefined
 
-from rotorfault.presets import presets
+from rotorfault.autopilot.presets import presets
+from rotorfault.base.versions import versions
 from rotorfault.studies.paper import ablation, figures, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.paper.verdicts import Claim
 from rotorfault.studies.runs import Result
-from rotorfault.versions import versions
 
 EXTRA_CAPTIONS = {
     "wind": "Claim 5: settling time and oscillation of case 1 against wind speed.",

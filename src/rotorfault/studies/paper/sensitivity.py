@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorfault.files import write_atomically
+from rotorfault.base.files import write_atomically
 from rotorfault.studies.paper.cases import CASES
 from rotorfault.studies.paper.conclusion_figure import conclusion_figure
 from rotorfault.studies.paper.judges import detected

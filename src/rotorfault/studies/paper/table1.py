@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorfault.files import write_atomically
+from rotorfault.base.files import write_atomically
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.runs import Result, Run
 

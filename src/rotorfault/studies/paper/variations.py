@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from rotorfault.scenario import load_scenario
+from rotorfault.scenario.scenario import load_scenario
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.measures import COST_READINGS
 from rotorfault.studies.runs import Run

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotorfault.files import write_atomically
+from rotorfault.base.files import write_atomically
 from rotorfault.studies.runs import Result, Run
 
 CONFIRMED, NOT_CONFIRMED, UNDER = "confirmed", "not confirmed", "confirmed under reading "

@@ -1,0 +1,289 @@
+r"""The closed loop about hover as a linear discrete system.
+
+With x all numbers that a flight carries from one sampling instant to the next (plant and autopilot memory), d a
+wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
+
+.. math:: x_{k+1} = f(x_k, d_k), \quad y_k = h(x_k) \qquad\Rightarrow\qquad
+          x_{k+1} = A x_k + B d_k, \quad y_k = C x_k
+
+with A, B, C from central differences of the very code that flies. Much of the memory does not act on the motion to
+first order: counters and constants, the last position, flags, and the Riccati gain, which multiplies an error of
+zero. Such states act on no other ones that do, so A is block triangular and leaving them out changes no pole of the
+rest: exact, no approximation.
+
+The plant's input is broken behind the autopilot, which goes on believing that the rotors do what it commanded.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.autopilot.allocation import ALLOCATORS
+from rotorfault.autopilot.allocation.protocol import settings_class
+from rotorfault.autopilot.autopilot import Autopilot
+from rotorfault.autopilot.diagnosis import DIAGNOSES
+from rotorfault.base.errors import InputError
+from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, level_start, quiet
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.signals import Command, Reference, Wrench
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.plant.plant import Plant
+from rotorfault.plant.wind import NoWind
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+AXES = ("thrust", "roll", "pitch", "yaw")
+STEP = 1e-5  # of a central difference, relative to max(1, |x|)
+SETTLED = 1e-11  # relative change per period below which the loop counts as settled
+MOST_SETTLING = 400  # periods
+# A state acts on another where a perturbation moves it by more than rounding.
+ROUNDING = 1e-14
+ROUGH = 1e-2  # relative difference of two Jacobians above which there is no derivative
+DEADBEAT = 1e-3  # |z| below which a pole is memory of a period or two, no motion
+
+
+class LinearLoop(NamedTuple):
+    """A closed loop about an equilibrium: x+ = A x + B d, y = C x, axes in the order of `AXES`."""
+
+    A: Array  # (n, n)
+    B: Array  # (n, 4): wrench added at the plant's input, N and N m
+    C: Array  # (4, n): wrench that the commands ask for, N and N m
+    period: float  # s
+    names: tuple[str, ...]  # of the n states
+    left_out: tuple[str, ...]  # states that do not act on the motion to first order
+    residual: float  # largest relative change of a state per period, where the loop was linearised
+
+    @property
+    def poles(self) -> Complex:
+        """Poles in the z plane, slowest first."""
+        z: Complex = np.linalg.eigvals(self.A).astype(np.complex128)
+        return z[np.argsort(-np.abs(z))]
+
+    @property
+    def continuous_poles(self) -> Complex:
+        """log(z)/T in rad/s of all poles but those at z = 0, which are memory of a period or two; slowest first."""
+        z = self.poles
+        s: Complex = np.asarray(np.log(z[np.abs(z) > DEADBEAT]) / self.period, dtype=np.complex128)
+        return s[np.argsort(np.abs(s))]
+
+    @property
+    def stable(self) -> bool:
+        """Whether all poles are inside the unit circle."""
+        return bool(np.all(np.abs(self.poles) < 1.0))
+
+    def loop_transfer(self, omega: Array) -> Complex:
+        """L of `rotorfault.analysis.margins` for each axis at frequencies in rad/s up to pi/period; shape (frequencies, 4)."""
+        z = np.exp(1j * np.asarray(omega, dtype=float) * self.period)
+        resolvent = z[:, None, None] * np.eye(len(self.A)) - self.A
+        T = np.einsum("in,wni->wi", self.C, np.linalg.solve(resolvent, self.B[None] + 0j))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            L: Complex = -T / (1.0 + T)
+        return L
+
+    def changed(self, axis: str, gain: float = 1.0, delay: int = 0) -> Array:
+        """A of the same loop with a gain and a delay of whole periods at the plant's input of one axis.
+
+        Parameters
+        ----------
+        axis : str
+            One of `AXES`.
+        gain : float
+        delay : int
+            Periods, 0 or more.
+        """
+        i, n = AXES.index(axis), len(self.A)
+        b, c = self.B[:, [i]], self.C[[i], :]
+        opened = self.A - b @ c
+        if delay == 0:
+            return opened + gain * (b @ c)
+        big = np.zeros((n + delay, n + delay))
+        big[:n, :n], big[:n, [n]] = opened, gain * b
+        big[n : n + delay - 1, n + 1 :] = np.eye(delay - 1)
+        big[[n + delay - 1], :n] = c
+        return big
+
+
+# ------------------------------------------------------------------------------------------------------ linearisation
+
+
+def calm(
+    loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False
+) -> tuple[ClosedLoop, LoopParameters]:
+    """The same loop without wind and faults; without diagnosis and with nominal allocation unless `keep_belief`.
+
+    An observer acts on the motion through its decision alone, and a belief that changes by jumps has no derivative.
+    """
+    plant = Plant(loop.plant.model, NoWind(NoWind.Settings()), (), loop.plant.substeps)
+    parameters = parameters._replace(
+        plant=parameters.plant._replace(wind=plant.wind.parameters(), faults=()), period=float(parameters.period)
+    )
+    # A copy, for trial steps must not change a controller that keeps state of its own.
+    autopilot = copy.deepcopy(loop.autopilot)
+    if keep_belief:
+        return ClosedLoop(plant, loop.sensors, autopilot), parameters
+    off, nominal = DIAGNOSES["off"], ALLOCATORS["nominal"]
+    diagnoser = off(off.Settings())
+    autopilot = Autopilot(diagnoser, autopilot.controller, nominal(settings_class(nominal)()))
+    belief = parameters.autopilot._replace(
+        diagnosis=diagnoser.parameters(parameters.autopilot.vehicle, parameters.period)
+    )
+    return ClosedLoop(plant, loop.sensors, autopilot), parameters._replace(autopilot=belief)
+
+
+def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False) -> LinearLoop:
+    """Linearise a closed loop about the hover in which it settles, reference at rest at the origin.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+        Its wind and faults are left out.
+    parameters : LoopParameters
+        Of floats.
+    keep_belief : bool
+        Keep diagnosis and allocation as they are; else diagnosis `off` and allocation `nominal`.
+
+    Raises
+    ------
+    InputError
+        If the loop settles nowhere, has no derivative where it settles (discontinuous switching), or the controller
+        keeps state of its own outside its memory, so that the same step gives different results.
+    """
+    flight = _Flight(*calm(loop, parameters, keep_belief))
+    x = _settled(flight)
+    moved = x + STEP * _scale(x)
+    if not np.array_equal(flight.advance(moved)[0], flight.advance(moved)[0], equal_nan=True):
+        raise InputError("the controller keeps state of its own outside its memory; such a loop cannot be linearised")
+    for _ in range(3):
+        A, C, kept = _jacobian(flight, x, STEP)
+        change = flight.advance(x)[0] - x
+        residual = float(np.max(np.abs(change / _scale(x))[kept]))
+        if not residual > SETTLED:
+            break
+        # The rest of the way, as far as there is one: to where a step changes nothing.
+        x = x.copy()
+        x[kept] += np.linalg.lstsq(np.eye(len(kept)) - A[np.ix_(kept, kept)], change[kept], rcond=None)[0]
+    if not residual <= 1e-6:
+        raise InputError(f"the loop does not come to rest in hover (it still changes by {residual:.2g} a period)")
+    finer = _jacobian(flight, x, STEP / 4.0)[0]
+    inner = np.ix_(kept, kept)
+    if not np.max(np.abs(A - finer)[inner] / (1.0 + np.abs(A[inner]))) <= ROUGH:
+        raise InputError("the loop has no derivative in hover; choose switching = 'smooth'")
+    names = leaf_names(flight.template)
+    return LinearLoop(
+        A=A[inner],
+        B=_input(flight, x)[kept],
+        C=C[:, kept],
+        period=flight.period,
+        names=tuple(names[i] for i in kept),
+        left_out=tuple(name for i, name in enumerate(names) if i not in set(kept)),
+        residual=residual,
+    )
+
+
+class _Flight:
+    """The loop as a map of arrays: columns are states, each stepped by itself."""
+
+    def __init__(self, loop: ClosedLoop, parameters: LoopParameters) -> None:
+        self.loop, self.parameters, self.period = loop, parameters, float(parameters.period)
+        self.vehicle: Vehicle = parameters.plant.vehicle
+        # A controller may be written for floats only; else all columns go through one step.
+        self.one_by_one = bool(getattr(loop.autopilot.controller, "python_only", True))
+        zero = zeros()
+        self.drive: Drive = quiet(Reference(zero, zero, zero, 0.0, 0.0, 0.0))
+        self.template: LoopState = loop.initial(level_start(zero), self.drive, parameters)
+        self.start: Array = np.array([[float(leaf)] for leaf in flatten(self.template)])
+
+    def advance(self, X: Array, added: Array | None = None) -> tuple[Array, Array]:
+        """States after a period with wrenches added at the plant's input, and the wrenches that were asked for.
+
+        Parameters
+        ----------
+        X : (states, N) float
+        added : (4, N) float, N and N m
+        """
+        count = X.shape[1]
+        if self.one_by_one or count == 1:
+            pieces = [
+                self._step(X[:, k].tolist(), None if added is None else added[:, k].tolist()) for k in range(count)
+            ]
+            after, asked = (np.array(part, dtype=float).T for part in zip(*pieces, strict=True))
+            return after, asked
+        rows = self._step(list(X), None if added is None else list(added))
+        after, asked = (np.array([np.broadcast_to(row, count) for row in part]) for part in rows)
+        return after, asked
+
+    def _step(self, leaves: list[Scalar], added: list[Scalar] | None) -> tuple[list[Scalar], list[Scalar]]:
+        state = unflatten(self.template, leaves)
+        after, signals = self.loop.step(state, self.drive, self.parameters)
+        k = self.vehicle.rotor_gain
+        if added is not None:
+            extra = nominal_inverse(self.vehicle, Wrench(added[0], Vec3.of(added[1:]))) / k
+            command = Command(signals.thrust_command + extra, after.autopilot.direct_acceleration_W)
+            time = state.steps * self.period
+            after = after._replace(
+                plant=self.loop.plant.step(state.plant, command, time, self.parameters.plant, self.period)
+            )
+        return flatten(after), flatten(wrench_of(self.vehicle, signals.thrust_command * k))
+
+
+def _scale(x: Array) -> Array:
+    return np.maximum(1.0, np.abs(x))
+
+
+def _settled(flight: _Flight) -> Array:
+    """The state of least change, as a column; an unstable loop leaves its equilibrium again."""
+    x = best = flight.start
+    counted = np.array([name.startswith(("steps", "scores.")) for name in leaf_names(flight.template)])
+    least = math.inf
+    for _ in range(MOST_SETTLING):
+        after, _ = flight.advance(x)
+        change = np.abs(after - x) / _scale(x)
+        change[counted] = 0.0
+        largest = float(np.max(change))
+        if not largest < 1e3 * max(least, SETTLED):
+            break
+        if largest < least:
+            least, best = largest, after
+        if largest < SETTLED:
+            break
+        x = after
+    return best
+
+
+def _jacobian(flight: _Flight, x: Array, step: float) -> tuple[Array, Array, list[int]]:
+    """A and C for all states by central differences, and the indices of the states that act on the motion."""
+    h = step * _scale(x)
+    d = np.diag(h[:, 0])
+    (above, asked_above), (below, asked_below) = flight.advance(x + d), flight.advance(x - d)
+    acts = np.abs(above - below) > ROUNDING * _scale(x)
+    A = np.where(acts, (above - below) / (2.0 * h.T), 0.0)
+    return A, (asked_above - asked_below) / (2.0 * h.T), _acting(acts, flight)
+
+
+def _input(flight: _Flight, x: Array) -> Array:
+    """B for all states."""
+    vehicle = flight.vehicle
+    arm = max(math.hypot(a, b) for a, b in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+    h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, vehicle.torque_ratio])
+    start, d = np.repeat(x, 4, axis=1), np.diag(h)
+    B: Array = (flight.advance(start, d)[0] - flight.advance(start, -d)[0]) / (2.0 * h)
+    return B
+
+
+def _acting(acts: NDArray[np.bool_], flight: _Flight) -> list[int]:
+    """Indices of the plant's states and of all that act on them, directly or through others."""
+    kept = np.array([name.startswith("plant.") for name in leaf_names(flight.template)])
+    while True:
+        more = kept | np.any(acts[kept], axis=0)
+        if np.array_equal(more, kept):
+            return [int(i) for i in np.flatnonzero(kept)]
+        kept = more

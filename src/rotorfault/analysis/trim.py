@@ -1,0 +1,310 @@
+"""Trim: what hover takes, how the closed loop behaves about it, and how much gain and delay it stands.
+
+What ``rotorfault trim VEHICLE`` prints. Hover is closed form; poles and margins come from `rotorfault.analysis.linearisation`
+and `rotorfault.analysis.margins`, on the full rigid body without wind and faults, with diagnosis `off` and allocation
+`nominal`: an observer acts on the motion only through its decision. A given loss changes nothing in them: it is asked
+of `rotorfault.analysis.hover` alone, whether hover is still possible.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
+from rotorfault.analysis.hover_model import equations
+from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, linearise
+from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
+from rotorfault.autopilot.allocation import ALLOCATORS
+from rotorfault.autopilot.allocation.protocol import settings_class
+from rotorfault.autopilot.autopilot import Autopilot
+from rotorfault.autopilot.control import CONTROLLERS
+from rotorfault.autopilot.control.cascade import attitude_for
+from rotorfault.autopilot.diagnosis import DIAGNOSES
+from rotorfault.autopilot.presets import preset as preset_settings
+from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
+from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.signals import Wrench
+from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.plant import PLANTS, SENSORS, WINDS
+from rotorfault.plant.plant import Plant
+
+__all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings", "trim_report"]
+
+# The usual least margins of a flight control loop (6 dB, 30 degrees).
+LEAST_GAIN_MARGIN = 2.0
+LEAST_PHASE_MARGIN = math.radians(30.0)
+SAME_POLE = 2e-3  # relative distance within which poles are listed as one; a computed double pole is split a little
+
+
+class Hover(NamedTuple):
+    """Rest in the air, wind steady, at zero yaw."""
+
+    thrust: PerRotor  # N, delivered by each rotor
+    command: PerRotor  # N
+    rotor_speed: PerRotor  # rad/s
+    attitude: Vec3  # rad: roll, pitch, yaw
+    tilt: float  # rad, of the thrust axis from the vertical
+    thrust_margin: float  # greatest total thrust over the one needed; below 1 there is no hover
+    torque_max: Vec3  # N m: greatest torque about each body axis, either way, that leaves the thrust as it is
+
+
+class TrimReport(NamedTuple):
+    """All that is known about a vehicle with a controller in hover; `text` prints it."""
+
+    vehicle: str
+    controller: str
+    period: float  # s
+    numbers: Vehicle
+    hover: Hover
+    attainable: Attainable
+    linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
+    margins: dict[str, Margins]  # per axis of `rotorfault.analysis.linearisation.AXES`; empty without linearisation
+    warnings: tuple[str, ...]
+
+    def text(self) -> str:
+        """Plain text for a terminal of 100 columns."""
+        model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
+        loop = (model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
+        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), *loop)
+        return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
+    """Thrusts, speeds, tilt and reserves in hover, in still air or a steady wind.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Sound rotors, two opposite pairs.
+    wind_W : Vec3, m/s, optional
+        Velocity of the air over ground; its drag k_d wind is held by tilting into it.
+    """
+    drag_W = (zeros() if wind_W is None else wind_W) * vehicle.linear_drag
+    force_W = Vec3(0.0, 0.0, vehicle.mass * vehicle.gravity) - drag_W
+    needed = float(force_W.norm())
+    thrust = nominal_inverse(vehicle, Wrench(needed, zeros()))
+    k = vehicle.rotor_gain
+    return Hover(
+        thrust=thrust,
+        command=thrust / k,
+        rotor_speed=rotor_speeds(vehicle, thrust),
+        attitude=attitude_for(force_W, 0.0, 0.0),
+        tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
+        thrust_margin=4.0 * k * vehicle.thrust_max / needed,
+        torque_max=Vec3.of(_most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
+    )
+
+
+def _most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:
+    """Largest torque in N m either way about an axis before a rotor reaches a limit; 0 if one is beyond it."""
+    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
+    change = nominal_inverse(vehicle, Wrench(0.0, axis_B))
+    # Rotors that give no torque about the axis do not limit it.
+    least = 1e-9 * max(abs(c) for c in change)
+    room = [min(high - f, f - low) / abs(c) for f, c in zip(thrust, change, strict=True) if abs(c) > least]
+    return float(max(0.0, min(room)))
+
+
+def hover_loop(
+    vehicle: Vehicle, controller: Any, period: float, plant: str = "rigid_body"
+) -> tuple[ClosedLoop, LoopParameters]:
+    """A closed loop in still air with sound rotors, ideal sensors, no diagnosis and nominal allocation.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Truth and belief.
+    controller : Controller
+    period : float, s
+    plant : str
+        Name of the model of the body.
+    """
+    off, nominal, ideal, none = DIAGNOSES["off"], ALLOCATORS["nominal"], SENSORS["ideal"], WINDS["none"]
+    body = Plant(PLANTS[plant](), _default(none), (), max(1, round(period / 0.001)))
+    sensors = _default(ideal)
+    autopilot = Autopilot(off(off.Settings()), controller, nominal(settings_class(nominal)()))
+    loop = ClosedLoop(body, sensors, autopilot)
+    return loop, LoopParameters(
+        plant=body.parameters(vehicle),
+        autopilot=autopilot.parameters(vehicle, period),
+        sensors=sensors.parameters(),
+        period=period,
+    )
+
+
+def _default(part: Any) -> Any:
+    return part(part.Settings())
+
+
+def trim_report(
+    vehicle: Vehicle | VehicleFile | str | Path,
+    controller: Any = "roismc",
+    preset: str | None = None,
+    period: float = 0.001,
+    loss: PerRotor | None = None,
+) -> TrimReport:
+    """Hover, what of it losses leave, closed-loop poles, gain and delay margins and what to be warned of.
+
+    Parameters
+    ----------
+    vehicle : Vehicle, VehicleFile, or name or path of a vehicle file
+    controller : str or Controller
+        Name of a registered controller, or one that is made already.
+    preset : str, optional
+        Preset of a registered controller; its own default if not given.
+    period : float, s
+        Sampling period.
+    loss : PerRotor, optional
+        Of the rotors, 0 to 1, for `TrimReport.attainable`; all else is with sound rotors.
+
+    Raises
+    ------
+    InputError
+        If the period is not above 0 and up to 1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
+        preset.
+    """
+    if not 0.0 < period <= 1.0:
+        raise InputError(f"period: got {period!r} s; allowed: greater than 0, up to 1")
+    if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
+        raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
+    if isinstance(vehicle, (str, Path)):
+        vehicle = load_vehicle(vehicle)
+    label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
+    if isinstance(controller, str):
+        kind = CONTROLLERS[controller]
+        given = preset_settings(controller, {} if preset is None else {"preset": preset})
+        made, name = kind(validate(kind.Settings, given, controller)), controller
+        name += "" if preset is None else f" ({preset})"
+    else:
+        made, name = controller, type(controller).__name__
+    warnings = sampled_data_check(made, numbers, period)
+    linear, found = None, {}
+    try:
+        linear = linearise(*hover_loop(numbers, made, period))
+        found = margins(linear)
+        warnings += _loop_warnings(linear, found)
+    except InputError as error:
+        warnings.append(f"no linearisation: {error}")
+    possible = attainable(numbers, loss)
+    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, found, tuple(warnings))
+
+
+def _loop_warnings(linear: LinearLoop, found: dict[str, Margins]) -> list[str]:
+    if not linear.stable:
+        z = linear.poles[0]
+        s = np.log(z) / linear.period
+        return [f"the closed loop is not stable in hover: pole {_complex(s)} rad/s, |z| = {abs(z):.6g}; no margins"]
+    lines = [
+        f"closed-loop pole {_complex(s)} rad/s is hardly damped: {-s.real / abs(s):.2g}, below {LEAST_DAMPING:g}"
+        for s, _, _ in _distinct(linear)
+        if -s.real < LEAST_DAMPING * abs(s)
+    ]
+    for axis, m in found.items():
+        if m.gain_up < LEAST_GAIN_MARGIN:
+            lines.append(f"{axis}: gain margin {m.gain_up:.3g} ({_decibel(m.gain_up)}), below the usual 6 dB")
+        if m.gain_down > 1.0 / LEAST_GAIN_MARGIN:
+            down = f"{m.gain_down:.3g} ({_decibel(m.gain_down)})"
+            lines.append(f"{axis}: stable down to a gain of {down} only; usual: down to -6 dB")
+        if m.phase < LEAST_PHASE_MARGIN:
+            lines.append(f"{axis}: phase margin {math.degrees(m.phase):.3g} deg, below the usual 30 deg")
+        if m.delay < linear.period:
+            lines.append(f"{axis}: delay margin {m.delay:.3g} s, less than one sampling period")
+    return lines
+
+
+# ---------------------------------------------------------------------------------------------------------- the text
+
+
+def _hover_lines(report: TrimReport) -> list[str]:
+    v, h = report.numbers, report.hover
+    speed, limits = h.rotor_speed.r1, f"{v.thrust_min:g} to {v.thrust_max:g} N"
+    torque = ", ".join(f"{t:.3g}" for t in h.torque_max)
+    turn = ", ".join(f"{t:.4g}" for t in h.torque_max.over(v.inertia))
+    return [
+        f"Trim of '{report.vehicle}' with {report.controller}, sampled every {report.period:g} s",
+        "",
+        "Hover",
+        f"  thrust of a rotor       {h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})",
+        f"  speed of a rotor        {speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)",
+        f"  thrust to weight        {h.thrust_margin:.3g}",
+        f"  torque in reserve       {torque} N m about roll, pitch, yaw ({turn} rad/s^2)",
+        f"  rotor lag               {v.rotor_bandwidth:g} rad/s",
+    ]
+
+
+def _pole_lines(report: TrimReport) -> list[str]:
+    if report.linear is None:
+        return ["Closed-loop poles: none, the loop has no linearisation"]
+    count, left = len(report.linear.names), len(report.linear.left_out)
+    rows = [
+        f"  {_complex(s):>22}  {abs(s):9.4g}  {-s.real / max(abs(s), 1e-300):7.3f}  {many:5d}  {motion}"
+        for s, many, motion in _distinct(report.linear)
+    ]
+    return [
+        f"Closed-loop poles in hover, log(z)/T ({count} states; {left} that do not act on the motion left out)",
+        f"  {'pole [rad/s]':>22}  {'|s| rad/s':>9}  {'damping':>7}  {'times':>5}  motion",
+        *rows,
+    ]
+
+
+def _margin_lines(report: TrimReport) -> list[str]:
+    if report.linear is None or not report.linear.stable:
+        return ["Margins: none, for want of a loop that is stable in hover"]
+    lines = [
+        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
+        f"  axis    {'gain up':>16}  {'gain down':>17}  {'delay [ms]':>10}  {'phase [deg]':>11}  {'at rad/s':>10}",
+    ]
+    for axis, m in report.margins.items():
+        up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
+        numbers = f"{1e3 * m.delay:10.3g}  {math.degrees(m.phase):11.3g}  {m.crossover:10.3g}"
+        lines.append(f"  {axis:6}  {up:>16}  {down:>17}  {numbers}")
+    return lines
+
+
+def _warning_lines(report: TrimReport) -> list[str]:
+    return ["Warnings", *(f"  - {line}" for line in report.warnings)] if report.warnings else []
+
+
+def _decibel(gain: float) -> str:
+    return f"{20.0 * math.log10(gain):.1f} dB" if 0.0 < gain < math.inf else "none" if gain == gain else "-"
+
+
+def _complex(s: complex) -> str:
+    return f"{s.real:.4g}" if abs(s.imag) < 1e-6 * abs(s) else f"{s.real:.4g} +- {abs(s.imag):.4g}j"
+
+
+# Translation along x goes through pitch, along y through roll.
+_MOTION = {"p_W": ("pitch", "roll", "thrust"), "v_W": ("pitch", "roll", "thrust")}
+_TURN = ("roll", "pitch", "yaw")
+
+
+def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
+    """Poles log(z)/T in the upper half plane, slowest first, how often each comes, and the axes that move in it."""
+    z, vectors = np.linalg.eig(linear.A)
+    motion = np.zeros((len(AXES), len(z)))
+    for name, row in zip(linear.names, np.abs(vectors), strict=True):
+        field, component = name.split(".")[-2:]
+        if name.startswith("plant.body.") and component in "xyz":
+            motion[AXES.index(_MOTION.get(field, _TURN)["xyz".index(component)])] += row
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = np.log(z.astype(complex)) / linear.period
+    # Computed, a double real pole is a close complex pair.
+    s = np.where(np.abs(s.imag) <= 1e-5 * np.abs(s), s.real, s)
+    left = [i for i in np.argsort(np.abs(s)) if abs(z[i]) > DEADBEAT and s[i].imag >= 0.0]
+    found: list[tuple[complex, int, str]] = []
+    while left:
+        same = [i for i in left if abs(s[i] - s[left[0]]) <= SAME_POLE * abs(s[left[0]])]
+        share = motion[:, same].sum(axis=1)
+        moved = [axis for axis, part in zip(AXES, share, strict=True) if part > max(1e-4 * share.max(), 1e-9)]
+        found.append((complex(np.mean(s[same])), len(same), ", ".join(moved) or "none (memory)"))
+        left = [i for i in left if i not in same]
+    return found

@@ -1,0 +1,61 @@
+"""What commands are believed to give, and what of the demand they leave out.
+
+A command c_i gives, in steady state and as the autopilot believes, the thrust
+
+    F_i = (1 - loss_i) k c_i                                                                        ((7), (8))
+
+with the rotor gain k. The unallocated wrench is the demanded one less the wrench of these thrusts.
+"""
+
+from __future__ import annotations
+
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, absolute, either, less_equal, negated
+from rotorfault.model.mixer import pair_demand
+from rotorfault.model.signals import Allocation, Diagnosis, Wrench
+from rotorfault.model.vehicle import Vehicle, wrench_of
+
+TOLERANCE = 1e-9  # of the largest rotor command: below it a difference is rounding
+
+
+def believed_effect(vehicle: Vehicle, diagnosis: Diagnosis) -> PerRotor:
+    """Believed steady thrust per commanded thrust of each rotor, (1 - loss_i) k."""
+    return diagnosis.loss.map(lambda loss: (1.0 - loss) * vehicle.rotor_gain)
+
+
+def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: PerRotor) -> Allocation:
+    """State what commands leave of a demand.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    wrench : Wrench
+        The demand, thrust [N] and torque [N m, body axes].
+    diagnosis : Diagnosis
+        Only the loss is used.
+    command : PerRotor
+        In N.
+
+    Returns
+    -------
+    Allocation
+        An axis counts as given up when more than `TOLERANCE` of the largest rotor command is missing or too much,
+        measured in rotor thrust; NaN counts as given up.
+    """
+    given = wrench_of(vehicle, command * believed_effect(vehicle, diagnosis))
+    unallocated = Wrench(wrench.thrust - given.thrust, wrench.torque_B - given.torque_B)
+    missing = pair_demand(vehicle, unallocated)
+    tolerance = TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
+
+    def beyond(x: Scalar) -> Scalar:
+        return negated(less_equal(absolute(x), tolerance))
+
+    return Allocation(
+        command=command,
+        unallocated=unallocated,
+        given_up=Vec3(
+            either(beyond(missing.D12), beyond(missing.D34)),
+            beyond(missing.S12 + missing.S34),
+            beyond(missing.S12 - missing.S34),
+        ),
+    )

@@ -1,0 +1,38 @@
+"""How much thrust the believed rotors can give while the body stays balanced.
+
+With what rotor i can give at most, H_i = (1 - loss_i) k c_max, opposite rotors balanced in tilt give at most
+
+    S12 = 2 min(H1, H2),   S34 = 2 min(H3, H4)
+
+so the thrust is at most 2 min(S12, S34) with yaw in balance and S12 + S34 with yaw given up. Position control that
+asks for more loses yaw, and on a vehicle with a small yaw inertia then spins within a fraction of a second.
+"""
+
+from __future__ import annotations
+
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.model.vehicle import Vehicle
+
+HOVER_RESERVE = 1.2  # of the weight: thrust for which yaw is given up where it cannot be had in balance
+
+
+def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
+    """Largest total thrust in N that position control should ask for.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    loss : PerRotor
+        Believed loss of each rotor.
+
+    Returns
+    -------
+    scalar
+        In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
+        this as there is with yaw given up.
+    """
+    most = loss.map(lambda x: (1.0 - x) * (vehicle.rotor_gain * vehicle.thrust_max))
+    S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
+    with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
+    return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

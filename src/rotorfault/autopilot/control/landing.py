@@ -1,0 +1,268 @@
+r"""What the autopilot does about a confirmed fault: fly on, or land. It stands between reference and controller.
+
+``land`` replaces the scenario's reference, from the sampling instant at which a declared fault has stood for
+``confirmation``, by one that starts at the measured position p, velocity v and yaw, so that nothing jumps, and obeys
+
+.. math:: \dot p = v, \qquad \dot v = \frac{v_{goal} - v}{\max(T,\ |v_{goal} - v| / a_{max})}
+
+with the horizontal goal 0: it brakes, exponentially once slow, and then holds that point. The vertical goal is
+:math:`-w\,\max(0, 1 - |v_{xy}| / w)`: it sinks at the rate w as soon as the braking is over. The controller gets p, v
+and this acceleration as reference.
+
+The ground's height is not used; both signs of it come from measurements and from what the believed rotors give.
+
+*Contact* is suspected while the reference sinks at w/2 or faster and an upward force that nothing explains,
+low-passed over ``contact_filter``, exceeds ``contact_share`` of the weight: lost thrust cannot look like that. It is
+answered in a way that a gust can undo. All thrusts are scaled by 1 - r, where the relief r goes to 1 with the time
+constant ``relief`` while contact is suspected, and back to 0 otherwise: a vehicle that stands on one foot must not be
+tilted by its own controller. And the belief about the rotors is held, for a diagnosis takes forces at the feet for
+faults.
+
+*Touch-down* is recognised when for ``persistence`` on end the reference sinks so, the measured vertical speed stays
+within ``still_speed`` and the believed thrust below ``thrust_share`` of the weight. A vehicle in the air cannot do
+both for long: without lift it falls. The rotors are then stopped for good.
+
+Nothing here sees the plant: a false alarm lands the vehicle too, and a fault that is not diagnosed does not.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol, final
+
+from pydantic import Field
+
+from rotorfault.base.config import Strict
+from rotorfault.base.registry import Registry
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import select_record
+from rotorfault.maths.scalar import (
+    Scalar,
+    absolute,
+    both,
+    either,
+    greater,
+    greater_equal,
+    less,
+    maximum,
+    negated,
+    select,
+    sqrt,
+)
+from rotorfault.model.signals import Diagnosis, Measurement, Reference
+from rotorfault.model.vehicle import Vehicle
+
+
+class ResponseInputs(NamedTuple):
+    """All that a response to a fault may use at one sampling instant."""
+
+    measurement: Measurement
+    reference: Reference  # the scenario's
+    vehicle: Vehicle  # belief
+    diagnosis: Diagnosis
+    thrust: Scalar  # N: of all rotors now, as believed
+    unexplained_v_z: Scalar  # m/s: change of vertical velocity over the last period that the believed model misses
+
+
+class Decided(NamedTuple):
+    """What is flown in place of the scenario's reference."""
+
+    reference: Reference
+    stage: Scalar  # 0 as the scenario wants, 1 descending, 2 rotors stopped
+    relief: Scalar  # share of every thrust that is taken back, 1 with rotors stopped
+
+
+class Response(Protocol):
+    """A block between reference and controller. A final class with its configuration class as `Settings`."""
+
+    def __init__(self, settings: Any) -> None: ...
+
+    def parameters(self) -> Any:
+        """Numbers as a record."""
+
+    def initial(self, measurement: Measurement) -> Any:
+        """Memory before the first step."""
+
+    def believed(self, memory: Any, diagnosis: Diagnosis) -> Diagnosis:
+        """What to believe of a diagnosis; asked before `step`."""
+
+    def step(self, memory: Any, inputs: ResponseInputs, parameters: Any, dt: Scalar) -> tuple[Any, Decided]:
+        """One sampling instant; pure."""
+
+    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
+        """What is sent to the rotors of commanded thrusts in N."""
+
+
+HOLD = 0.1  # relief above which the belief about the rotors is held
+
+RESPONSES: Registry[Any] = Registry("response to a fault")
+
+
+class Nothing(NamedTuple):
+    """The record without numbers."""
+
+
+@RESPONSES.register("continue")
+@final
+class Continue:
+    """Fly on as the scenario says, whatever is diagnosed."""
+
+    class Settings(Strict):
+        """Nothing to choose."""
+
+    def __init__(self, settings: Settings | None = None) -> None:
+        self.settings = settings
+
+    def parameters(self) -> Nothing:
+        """No numbers."""
+        return Nothing()
+
+    def initial(self, measurement: Measurement) -> Nothing:
+        """No memory."""
+        return Nothing()
+
+    def believed(self, memory: Nothing, diagnosis: Diagnosis) -> Diagnosis:
+        """All of it."""
+        return diagnosis
+
+    def step(
+        self, memory: Nothing, inputs: ResponseInputs, parameters: Nothing, dt: Scalar
+    ) -> tuple[Nothing, Decided]:
+        """The scenario's reference as it is."""
+        return memory, Decided(inputs.reference, 0.0, 0.0)
+
+    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
+        """As commanded."""
+        return thrust
+
+
+class LandParameters(NamedTuple):
+    """Numbers of a landing."""
+
+    descent_rate: Scalar  # m/s
+    braking: Scalar  # m/s^2
+    time_constant: Scalar  # s
+    confirmation: Scalar  # s
+    contact_share: Scalar  # 1
+    contact_filter: Scalar  # s
+    relief: Scalar  # s
+    still_speed: Scalar  # m/s
+    thrust_share: Scalar  # 1
+    persistence: Scalar  # s
+
+
+class LandMemory(NamedTuple):
+    """How far the landing is, and its reference."""
+
+    flagged: Scalar  # s: for how long a fault has been declared
+    landing: Scalar  # 1 from the confirmation on
+    lift: Scalar  # m/s^2: unexplained upward acceleration, low-passed
+    relief: Scalar  # 0 to 1
+    loss: PerRotor  # believed last
+    fault: PerRotor  # 1 where a fault was believed last
+    still: Scalar  # s: for how long it has looked like standing on the ground
+    down: Scalar  # 1 from the touch-down on
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    yaw: Scalar  # rad
+
+
+@RESPONSES.register("land")
+@final
+class Land:
+    """Brake, descend level to the ground at a gentle rate, recognise touch-down, stop the rotors."""
+
+    class Settings(Strict):
+        """How to come down, and when it counts as down."""
+
+        descent_rate: float = Field(default=0.5, gt=0.0, description="speed of the descent w [m/s]")
+        braking: float = Field(default=2.0, gt=0.0, description="largest acceleration of the reference [m/s^2]")
+        time_constant: float = Field(default=0.5, gt=0.0, description="of the approach to the wanted velocity [s]")
+        confirmation: float = Field(
+            default=0.05, ge=0.0, description="time that a declared fault must stand before the landing begins [s]"
+        )
+        contact_share: float = Field(
+            default=0.2, gt=0.0, description="upward force, as share of the weight, that is taken for the ground"
+        )
+        contact_filter: float = Field(default=0.01, gt=0.0, description="time constant of its low-pass [s]")
+        relief: float = Field(
+            default=0.06, gt=0.0, description="time constant with which thrust is taken back on contact [s]"
+        )
+        still_speed: float = Field(
+            default=0.1, gt=0.0, description="vertical speed below which it may stand on the ground [m/s]"
+        )
+        thrust_share: float = Field(
+            default=0.7, gt=0.0, lt=1.0, description="share of the weight below which thrust does not carry it"
+        )
+        persistence: float = Field(default=0.3, gt=0.0, description="time that both must hold [s]")
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+
+    def parameters(self) -> LandParameters:
+        """The settings as a record."""
+        return LandParameters(*(getattr(self.settings, name) for name in LandParameters._fields))
+
+    def initial(self, measurement: Measurement) -> LandMemory:
+        """No fault seen yet."""
+        none = PerRotor.all(0.0)
+        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, 0.0, 0.0, measurement.p_W, zeros(), 0.0)
+
+    def believed(self, memory: LandMemory, diagnosis: Diagnosis) -> Diagnosis:
+        """The last belief on the ground, or on what may be the ground; else the new one."""
+        hold = greater(memory.relief, HOLD)
+        loss, flagged = select_record(hold, (memory.loss, memory.fault), (diagnosis.loss, diagnosis.flagged))
+        return diagnosis._replace(loss=loss, flagged=flagged)
+
+    def step(
+        self, memory: LandMemory, inputs: ResponseInputs, parameters: LandParameters, dt: Scalar
+    ) -> tuple[LandMemory, Decided]:
+        """One sampling instant: the reference now, and that of the next instant in memory."""
+        p, seen = parameters, inputs.measurement
+        # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
+        half = 0.5 * dt
+        none = inputs.diagnosis.flagged.map(negated).reduce(both)
+        flagged = select(none, 0.0, memory.flagged + dt)
+        begun = both(negated(memory.landing), both(negated(none), greater_equal(flagged, p.confirmation - half)))
+        landing = either(memory.landing, begun)
+
+        p_W, v_W = select_record(begun, (seen.p_W, seen.v_W), (memory.p_W, memory.v_W))
+        yaw = select(begun, seen.attitude.z, memory.yaw)
+
+        # Contact: suspected, and answered.
+        sinking = both(landing, less(v_W.z, -0.5 * p.descent_rate))
+        lift = memory.lift + (inputs.unexplained_v_z - memory.lift * dt) / (p.contact_filter + dt)
+        contact = both(sinking, greater(lift, p.contact_share * inputs.vehicle.gravity))
+        relief = memory.relief + (contact - memory.relief) * (dt / (p.relief + dt))
+
+        # Touch-down.
+        weight = inputs.vehicle.mass * inputs.vehicle.gravity
+        standing = both(less(absolute(seen.v_W.z), p.still_speed), less(inputs.thrust, p.thrust_share * weight))
+        still = select(both(sinking, standing), memory.still + dt, 0.0)
+        touched = both(negated(memory.down), greater_equal(still, p.persistence - half))
+        down = either(memory.down, touched)
+
+        # Reference. The small speed keeps the goal's slope finite at rest.
+        drift = sqrt(v_W.x * v_W.x + v_W.y * v_W.y + 1e-18)
+        goal_W = Vec3(0.0, 0.0, -p.descent_rate * maximum(1.0 - drift / p.descent_rate, 0.0))
+        gap_W = goal_W - v_W
+        a_W = gap_W / maximum(p.time_constant, gap_W.norm() / p.braking)
+        # On the ground the reference stays where the vehicle stands.
+        p_W, v_W, a_W = select_record(
+            down,
+            (select_record(touched, seen.p_W, p_W), zeros(), zeros()),
+            (p_W, v_W, a_W),
+        )
+        wanted = Reference(p_W, v_W, a_W, yaw, 0.0, 0.0)
+        p_next_W, v_next_W = select_record(
+            landing, (p_W + v_W * dt + a_W * (0.5 * dt * dt), v_W + a_W * dt), (memory.p_W, memory.v_W)
+        )
+        relief = select(down, 1.0, relief)
+        told = inputs.diagnosis
+        after = LandMemory(
+            flagged, landing, lift, relief, told.loss, told.flagged, still, down, p_next_W, v_next_W, yaw
+        )
+        return after, Decided(select_record(landing, wanted, inputs.reference), landing + down, relief)
+
+    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
+        """Less on contact, the least once the vehicle is down."""
+        return thrust.map(lambda f: vehicle.thrust_min + (f - vehicle.thrust_min) * (1.0 - decided.relief))

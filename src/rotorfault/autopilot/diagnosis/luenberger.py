@@ -1,0 +1,206 @@
+r"""Luenberger observer of thrust deviations (section 4 of the paper, as decoded in docs/paper.md).
+
+States are the four rates that rotors act on (vertical speed and body rates) and four thrust deviations Delta F_i,
+rotor i's thrust less what a sound rotor would give; a deviation is taken to be constant. In the coordinates
+
+.. math:: \delta_z = \tfrac1m\sum_i\Delta F_i, \qquad \delta_\omega = J^{-1}\tau(\Delta F)
+
+the eight states fall apart into four channels (rate, deviation) with the same pair of poles, which keeps the rotors
+decoupled. In discrete time, with the model's rate change :math:`\Delta_k` over a period T,
+
+.. math:: \begin{pmatrix}\bar r\\ \bar\delta\end{pmatrix} =
+          \begin{pmatrix}1 & T\\ 0 & 1\end{pmatrix}\begin{pmatrix}\hat r\\ \hat\delta\end{pmatrix}
+          + \begin{pmatrix}\Delta_k\\ 0\end{pmatrix}, \qquad
+          \hat x = \bar x + L\,(r_{measured} - \bar r)
+
+with L placed at :math:`e^{pT}` for the continuous poles p. Three forms of the model:
+
+- ``linear``: the paper's hover linearisation. At a tilt it takes the missing vertical share of the thrust for lost
+  thrust on all rotors.
+- ``injected``: what is measured enters the model, so it stays linear in the states: the tilt's cosine in the
+  vertical balance, gyroscopic products, believed drag.
+- ``lag_states``: rotor outputs as plain lag states, so a deviation decays with the rotor bandwidth. Its estimate is
+  biased, because the lag model pulls it back to the command; kept to show that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple, final
+
+from pydantic import Field, field_validator
+
+from rotorfault.autopilot.diagnosis.decision import (
+    DecisionMemory,
+    DecisionParameters,
+    DecisionSettings,
+    decide,
+    decision_parameters,
+    undecided,
+)
+from rotorfault.autopilot.diagnosis.protocol import DIAGNOSES, DiagnosisInputs
+from rotorfault.base.config import Strict
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.scalar import Scalar, maximum
+from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.signals import Diagnosis, Measurement, Wrench
+from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, wrench_of
+
+Form = Literal["injected", "linear", "lag_states"]
+LEAST_COSINE = 0.2  # below it the vertical balance hardly sees the thrust; the observer must not divide by it
+
+
+class LuenbergerSettings(Strict):
+    """Observer and decision."""
+
+    form: Form = Field(default="injected", description="injected | linear | lag_states")
+    poles: tuple[float, float] = Field(
+        default=(120.0, 180.0), description="decay rates of the estimation error, the same pair per channel [rad/s]"
+    )
+    decision: DecisionSettings = Field(default=DecisionSettings(), description="threshold, persistence, smoothing")
+
+    @field_validator("poles")
+    @classmethod
+    def _stable(cls, poles: tuple[float, float]) -> tuple[float, float]:
+        if not min(poles) > 0.0:
+            raise ValueError("decay rates must be greater than 0: the observer would not converge")
+        if poles[0] == poles[1]:
+            raise ValueError("the two poles must differ, for the placement; one percent apart is enough")
+        return poles
+
+
+class LuenbergerParameters(NamedTuple):
+    """Numbers of the observer; the same gain serves all four channels."""
+
+    carry: Scalar  # s: how a deviation acceleration adds to the rate over one period
+    decay: Scalar  # what remains of a deviation over one period: 1 but for `lag_states`
+    gain_rate: Scalar  # innovation to rate
+    gain_deviation: Scalar  # 1/s, innovation to deviation acceleration
+    decision: DecisionParameters
+
+
+class LuenbergerMemory(NamedTuple):
+    """Observer state and decision."""
+
+    climb: Scalar  # m/s: estimated vertical speed
+    omega_B: Vec3  # rad/s: estimated body rates
+    delta_z: Scalar  # m/s^2: deviation of thrust over mass
+    delta_omega: Vec3  # rad/s^2: deviation of torque over inertia
+    started: Scalar  # 0 before the first step, then 1
+    decision: DecisionMemory
+
+
+def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[float, float]:
+    r"""Current-observer gain of one channel, in closed form.
+
+    After a measurement the error obeys (I - L C) A, which has the eigenvalues of A (I - L C). With c = carry and
+    d = decay that is
+
+    .. math:: \begin{pmatrix}1 & c\\ 0 & d\end{pmatrix}\begin{pmatrix}1 - L_1 & 0\\ -L_2 & 1\end{pmatrix} =
+              \begin{pmatrix}1 - L_1 - c L_2 & c\\ -d L_2 & d\end{pmatrix}
+
+    with determinant d (1 - L_1) and trace 1 - L_1 - c L_2 + d. Set equal to product and sum of the poles p and q:
+
+    .. math:: L_1 = 1 - \frac{p q}{d}, \qquad L_2 = \frac{(d - p)(d - q)}{c d}
+
+    Parameters
+    ----------
+    carry, decay : float
+        The channel is [[1, carry], [0, decay]], its rate is measured; neither is 0.
+    targets : (2,) float
+        Discrete poles p and q of the estimation error.
+
+    Returns
+    -------
+    (2,) float
+        L_1, innovation to rate, and L_2, to deviation.
+    """
+    p, q = targets
+    return 1.0 - p * q / decay, (decay - p) * (decay - q) / (carry * decay)
+
+
+@DIAGNOSES.register("luenberger")
+@final
+class Luenberger:
+    """Luenberger observer of thrust deviations with threshold and persistence."""
+
+    Settings = LuenbergerSettings
+    oracle_delay = None
+
+    def __init__(self, settings: LuenbergerSettings) -> None:
+        self.settings = settings
+
+    def parameters(self, vehicle: Vehicle, period: float) -> LuenbergerParameters:
+        """Discrete model and gain.
+
+        Raises
+        ------
+        InputError
+            If a pole is too fast for the sampling period, so that its discrete image cannot be told from 0.
+        """
+        fastest = max(self.settings.poles)
+        if fastest * period > 30.0:
+            raise InputError(
+                f"diagnosis.poles: {fastest:g} rad/s at a sampling period of {period:g} s; allowed: up to "
+                f"{30.0 / period:g} rad/s"
+            )
+        w = vehicle.rotor_bandwidth
+        decay = math.exp(-w * period) if self.settings.form == "lag_states" else 1.0
+        carry = (1.0 - decay) / w if self.settings.form == "lag_states" else period
+        p, q = self.settings.poles
+        gain_rate, gain_deviation = place(carry, decay, (math.exp(-p * period), math.exp(-q * period)))
+        return LuenbergerParameters(
+            carry, decay, gain_rate, gain_deviation, decision_parameters(self.settings.decision)
+        )
+
+    def initial(self, measurement: Measurement, parameters: LuenbergerParameters) -> LuenbergerMemory:
+        """Start at the measured rates without deviation."""
+        return LuenbergerMemory(measurement.v_W.z, measurement.omega_B, 0.0, zeros(), 0.0, undecided())
+
+    def step(
+        self, memory: LuenbergerMemory, inputs: DiagnosisInputs, parameters: LuenbergerParameters
+    ) -> tuple[LuenbergerMemory, Diagnosis]:
+        """One sampling instant."""
+        vehicle, dt, now = inputs.vehicle, inputs.elapsed, inputs.measurement
+        cosine, climb_change, omega_change = self._model(inputs)
+        # At the first step nothing has elapsed: the deviations (zero) must not be carried either.
+        carry = parameters.carry * memory.started
+        climb = memory.climb + climb_change * dt + cosine * memory.delta_z * carry
+        omega_B = memory.omega_B + omega_change * dt + memory.delta_omega * carry
+        delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
+
+        innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
+        delta_z = delta_z + parameters.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
+        delta_omega = delta_omega + innovation * parameters.gain_deviation
+        residual = nominal_inverse(vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega)))
+        decision, diagnosis = decide(memory.decision, residual, inputs.thrust, vehicle, parameters.decision, dt)
+        after = LuenbergerMemory(
+            climb=climb + parameters.gain_rate * innovation_z,
+            omega_B=omega_B + innovation * parameters.gain_rate,
+            delta_z=delta_z,
+            delta_omega=delta_omega,
+            started=1.0,
+            decision=decision,
+        )
+        return after, diagnosis
+
+    def _model(self, inputs: DiagnosisInputs) -> tuple[Scalar, Scalar, Vec3]:
+        """(cosine of the tilt, vertical acceleration, angular acceleration) of a sound vehicle, period's mean."""
+        vehicle = inputs.vehicle
+        wrench = wrench_of(vehicle, inputs.mean_thrust)
+        lift = wrench.thrust / vehicle.mass
+        turn = wrench.torque_B.over(vehicle.inertia)
+        if self.settings.form != "injected":
+            return 1.0, lift - vehicle.gravity, turn
+        before, now = inputs.previous, inputs.now
+        cosine = 0.5 * (before.axis_W.z + now.axis_W.z)
+        climb = 0.5 * (before.v_W.z + now.v_W.z)
+        omega_B = (before.omega_B + now.omega_B) * 0.5
+        J = vehicle.inertia
+        gyroscopic = gyroscopic_torque(vehicle, omega_B, inputs.residual_speed) - omega_B.cross(J.times(omega_B))
+        return (
+            cosine,
+            cosine * lift - vehicle.gravity - vehicle.linear_drag / vehicle.mass * climb,
+            turn + gyroscopic.over(J),
+        )

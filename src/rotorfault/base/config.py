@@ -1,0 +1,172 @@
+"""The base of all configuration, and its errors in one line each.
+
+Configuration comes from TOML files or from Python. It is checked once, at the edge; whatever is wrong leaves as an
+`InputError` of one line: ``FILE: key.path: what came; what is allowed``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from rotorfault.base.errors import InputError
+
+M = TypeVar("M", bound=BaseModel)
+
+Three = tuple[float, float, float]
+"""Three numbers, one per axis."""
+
+# Marks the errors that say what came by themselves, so that `explain` does not say it twice.
+_OWN = "rotorfault"
+
+
+class Strict(BaseModel):
+    """A configuration that refuses unknown keys, NaN and infinity, and cannot be changed once checked."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _know_all_keys(cls, data: Any) -> Any:
+        # pydantic would refuse them too, but could not name the nearest allowed key, and would add a second error
+        # about the key that was meant.
+        if isinstance(data, dict):
+            allowed = [name if field.alias is None else field.alias for name, field in cls.model_fields.items()]
+            for key, value in data.items():
+                if key not in allowed and key not in cls.model_fields:
+                    close = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.5)
+                    hint = f"; did you mean '{close[0]}'?" if close else ""
+                    raise refusal(str(key), f"unknown key{hint} (allowed: {', '.join(allowed)})")
+                # pydantic would take true for 1.
+                if isinstance(value, bool) and cls.model_fields[key].annotation in (float, int, float | None):
+                    raise refusal(str(key), f"got {str(value).lower()}; allowed: a number")
+        return data
+
+
+def refusal(key: str, message: str) -> PydanticCustomError:
+    """The error to raise in a validator when `message` says all: what came, what is allowed, how to mend it.
+
+    Parameters
+    ----------
+    key : str
+        The key below the validated object that is at fault; empty for the object itself.
+    message : str
+        One line.
+    """
+    return PydanticCustomError(_OWN, "{message}", {"message": message, "key": key})
+
+
+def explain(error: ValidationError, where: str) -> str:
+    """The first thing that is wrong, in one line: ``where: key.path: message; got X``.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+    where : str
+        The file, or what the configuration is for when it comes from Python.
+
+    Returns
+    -------
+    str
+        One line; it ends with the number of further errors, if there are any.
+    """
+    details = error.errors(include_url=False)
+    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
+    return f"{_one_line(details[0], where)}{more}"
+
+
+def passed_on(error: ValidationError) -> PydanticCustomError:
+    """The first thing that is wrong in a part, as the refusal to raise in the validator of the whole."""
+    details = error.errors(include_url=False)
+    more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
+    keys, message = _parts(details[0])
+    return refusal(".".join(keys), f"{message}{more}")
+
+
+def _one_line(detail: ErrorDetails, where: str) -> str:
+    keys, message = _parts(detail)
+    return ": ".join(part for part in (where, ".".join(keys), message) if part)
+
+
+def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
+    """Path of the key that is wrong, and what is wrong with it."""
+    keys = [str(part) for part in detail["loc"]]
+    message = detail["msg"]
+    if detail["type"] == _OWN:
+        context = detail.get("ctx", {})
+        keys += [str(context["key"])] if context.get("key") else []
+    elif detail["type"] == "missing":
+        message = "is missing; add it"
+    else:
+        message = re.sub(r"^(Input|String|Tuple|List) should", "must", message).replace("Value error, ", "")
+        message = re.sub(r"a valid dictionary or instance of \w+", "a table", message)
+        message += f"; got {_short(detail['input'])}"
+    return keys, " ".join(message.split())
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def validate(model: type[M], data: Any, where: str) -> M:
+    """Check configuration data against a model.
+
+    Parameters
+    ----------
+    model : type of pydantic.BaseModel
+    data : dict
+        As `read_toml` returns it.
+    where : str
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        If the data do not fit the model; the message is that of `explain`.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise InputError(explain(error, where)) from None
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, not UTF-8 or not TOML; the message names the file and, for a syntax
+        error, line and column.
+    """
+    return parse_toml(read_text(path), str(path))
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Parse TOML text that was read from `where`; raises InputError with line and column if it is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where}: not valid TOML: {error}; correct the syntax there") from None
+
+
+def read_text(path: str | Path) -> str:
+    """Read a UTF-8 text file; raises InputError in one line if it is missing, unreadable or not UTF-8."""
+    path = Path(path)
+    try:
+        return path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; give a file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None

@@ -1,0 +1,115 @@
+"""Writing files so that nobody ever sees half of one."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from rotorfault.base.errors import InputError
+
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file under a temporary name beside its place, then move it there in one step.
+
+    Parameters
+    ----------
+    path : Path
+        Its folder must exist.
+    write : callable
+        Writes the file at the path that it is given.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written; nothing is left behind.
+    """
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        # mkstemp makes files that only their owner may read; results are meant to be shared.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write a file that is there whole or not at all, even when the process is killed or the power fails.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; what was there before is still there, and nothing else.
+    """
+    # No pattern for finished files, such as *.parquet, may find it.
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        with temporary.open("xb") as file:
+            file.write(content)
+            file.flush()
+            # Else the name could reach the disk before the content does.
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+    _sync_folder(path.parent)
+
+
+def is_leftover(name: str) -> bool:
+    """Whether a file is one that `write_durably` was killed over."""
+    return re.fullmatch(r"\..+\.[0-9a-f]{8}\.tmp", name) is not None
+
+
+def _sync_folder(folder: Path) -> None:
+    if os.name == "nt":  # folders cannot be opened there
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def in_folder(path: Path) -> Path:
+    """The same path, if the folder that it lies in exists.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+    return path
+
+
+def output_folder(path: Path) -> Path:
+    """Make a folder for results and see that it can be written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path, prefix=".rotorfault-")
+        os.close(handle)
+        Path(name).unlink()
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{path}: is a file or lies below one; give a folder with --out") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder with --out") from None
+    return path

@@ -1,0 +1,341 @@
+"""Interactive maps and lines of a campaign, as plain data for plotly.js.
+
+Every cell carries what a reader may ask of it, and how to replay one of its flights: a lost one, if there is any.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.report.axis_drawing import (
+    DIFFERENCE_COLOURS,
+    SURVIVAL_COLOURS,
+    borders,
+    label,
+    places,
+    ticks,
+)
+from rotorfault.campaigns.report.curves import LEVELS, Crossings, Slice, crossings, edges
+from rotorfault.campaigns.report.limits import Limits
+from rotorfault.campaigns.report.maps import Maps, Pairing, VariantMap, View
+from rotorfault.campaigns.sampling.statistics import Array
+from rotorfault.report.style import BLACK, BLUE, VERMILION
+
+Spec = dict[str, Any]
+HEIGHT = 430  # pixels
+GREY_BAR, GREY_LINE = "rgba(0,0,0,0.55)", "#8a8a8a"
+DASHES = {0.5: "solid", 0.99: "dot"}
+
+
+class Cell(NamedTuple):
+    """What is said of a cell."""
+
+    where: str
+    lines: tuple[str, ...]
+    commands: tuple[str, ...]
+    about: str  # what the commands replay
+
+    def as_data(self) -> list[str]:
+        """As data of a point of a chart."""
+        return [self.where, "<br>".join(self.lines), "\n".join(self.commands), self.about]
+
+
+def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
+    """Every cell of a variant, an array of `Cell` of the shape of the map."""
+    variant = maps.variants[k]
+    found = np.empty(variant.cell.shape, dtype=object)
+    for at in np.ndindex(*variant.cell.shape):
+        found[at] = Cell(_where(maps, at), _said(variant, at), *_replay(variant, at, folder))
+    return found
+
+
+def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
+    """Every cell of a pair of variants, an array of `Cell` of the shape of the map."""
+    pairing, cell = maps.pairings[k], maps.variants[0].cell
+    found = np.empty(cell.shape, dtype=object)
+    for at in np.ndindex(*cell.shape):
+        number = max(int(pairing.first_apart[at]), 0)
+        commands = tuple(
+            _command(folder, f"--cell {cell[at]} --variant {shlex.quote(name)} --number {number}")
+            for name in (pairing.first, pairing.second)
+        )
+        apart = (
+            "the first flight that only one of them survived" if pairing.first_apart[at] >= 0 else "the first flight"
+        )
+        found[at] = Cell(_where(maps, at), _compared(pairing, at), commands, apart)
+    return found
+
+
+def survival_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -> Spec:
+    """Map of a variant's survival, with boundaries and limits of hover."""
+    variant = maps.variants[k]
+    data = [_heat(maps, part, variant.survival, cells, SURVIVAL_COLOURS, (0.0, 1.0), "survival")]
+    if (found := edges(maps, k, part)) is not None:
+        for text, lines, dash in (
+            ("limit of hover, yaw held", found.with_yaw, "solid"),
+            ("limit of hover, yaw given up", found.without_yaw, "dash"),
+        ):
+            data += _curve(maps, lines, text, {"color": VERMILION, "width": 2, "dash": dash})
+    for level in LEVELS:
+        crossed = crossings(maps, variant, part, level)
+        name = f"{100.0 * level:g} % survive"
+        data += _curve(maps, crossed.lines, name, {"color": BLACK, "width": 2, "dash": DASHES[level]})
+        data += _bars(maps, crossed, name)
+    return {"data": data, "layout": _layout(maps.views)}
+
+
+def difference_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -> Spec:
+    """Map of a difference; dots where it is significant."""
+    pairing = maps.pairings[k]
+    estimate = pairing.difference.estimate
+    most = 0.0 if np.isnan(estimate).all() else float(np.nanmax(np.abs(estimate)))
+    reach = max(math.ceil(10.0 * most) / 10.0, 0.1)
+    data = [_heat(maps, part, estimate, cells, DIFFERENCE_COLOURS, (-reach, reach), "difference")]
+    i, j = np.nonzero(part.of(pairing.significant))
+    x, y = (places(view) for view in maps.views[:2])
+    dots = {"color": BLACK, "size": 5}
+    data.append(
+        {"type": "scatter", "mode": "markers", "x": x[i].tolist(), "y": y[j].tolist(), "marker": dots,
+         "hoverinfo": "skip", "name": "significant", "showlegend": bool(len(i))}
+    )  # fmt: skip
+    return {"data": data, "layout": _layout(maps.views)}
+
+
+def survival_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
+    """A variant's survival along the one axis of a study."""
+    variant = maps.variants[k]
+    data = [_line(maps, variant.survival, variant.lower, variant.upper, cells, "survival")]
+    layout = _layout(maps.views[:1], "survival (–)", (-0.03, 1.05))
+    found = edges(maps, k, Slice("", (slice(None),)))
+    for dash, lines in zip(("solid", "dash"), found or (), strict=False):
+        for point in lines:
+            at = float(maps.views[0].drawn(point[:, 0])[0])
+            line = {"color": VERMILION, "width": 2, "dash": dash}
+            layout["shapes"] += [
+                {"type": "line", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1, "line": line}
+            ]
+    return {"data": data, "layout": layout}
+
+
+def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
+    """A difference along the one axis of a study."""
+    pairing = maps.pairings[k]
+    line = _line(maps, *pairing.difference, cells, "difference")
+    line["marker"]["color"] = [BLUE if yes else "white" for yes in pairing.significant]
+    line["marker"]["line"] = {"color": BLUE, "width": 1.5}
+    return {"data": [line], "layout": _layout(maps.views[:1], "difference of survival (–)", (-1.05, 1.05))}
+
+
+# ------------------------------------------------------------------------------------------------ what cells say
+
+
+def _where(maps: Maps, at: tuple[int, ...]) -> str:
+    units = [f" {view.unit}" if view.unit not in ("", "1") else "" for view in maps.views]
+    return ", ".join(f"{v.title} {v.said(i)}{u}" for v, i, u in zip(maps.views, at, units, strict=True))
+
+
+def _said(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
+    flights, survived = int(variant.flights[at]), int(variant.survived[at])
+    if not flights:
+        return ("no flights", f"hover physically possible: {possible_text(variant.possible, at)}")
+    grades = ", ".join(f"{name} {n}" for name, n in zip(GRADES, _of(variant.grades, at), strict=True) if n)
+    return (
+        f"survived {survived} of {flights}: {percent(variant.survival[at])} "
+        f"({percent(variant.lower[at])} to {percent(variant.upper[at])})",
+        grades,
+        f"recovery time: {_quantiles(_of(variant.recovery, at), 's', 'never')}",
+        f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'lost')}",
+        f"hover physically possible: {possible_text(variant.possible, at)}",
+    )
+
+
+def _of(values: NDArray[Any], at: tuple[int, ...]) -> NDArray[Any]:
+    """All grades, or quantiles, of a cell."""
+    return np.array([each[at] for each in values])
+
+
+def _compared(pairing: Pairing, at: tuple[int, ...]) -> tuple[str, ...]:
+    pairs = int(pairing.counts.pairs[at])
+    if not pairs:
+        return ("no common flights",)
+    low, high = (signed(each[at]) for each in (pairing.difference.lower, pairing.difference.upper))
+    return (
+        f"{pairing.first} less {pairing.second}: {signed(pairing.difference.estimate[at])} ({low} to {high})",
+        f"of {pairs} common flights {int(pairing.counts.only_first[at])} only by {pairing.first}, "
+        f"{int(pairing.counts.only_second[at])} only by {pairing.second}",
+        f"p = {pairing.p_value[at]:.2g} after Holm's correction"
+        f"{', significant' if pairing.significant[at] else ''}",
+    )  # fmt: skip
+
+
+def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tuple[str, ...], str]:
+    lost = int(variant.flights[at] - variant.survived[at])
+    if lost:
+        return (_command(folder, f"--flight {variant.first_lost[at]}"),), f"the first of {lost} lost flights"
+    command = _command(folder, f"--cell {variant.cell[at]} --variant {shlex.quote(variant.label)}")
+    return (command,), "the first flight; none was lost" if variant.flights[at] else "the flight that would be first"
+
+
+def _command(folder: Path, options: str) -> str:
+    return f"rotorfault replay {shlex.quote(str(folder))} {options}"
+
+
+def possible_text(found: Limits | None, at: tuple[int, ...]) -> str:
+    """Whether hover is possible, in words."""
+    if found is None:
+        return "not known"
+    words = {1.0: "yes", 0.0: "no"}
+    held, free = (words.get(float(each[at]), "depends on what is drawn") for each in found)
+    return held if held == free else f"with yaw held {held}, given up {free}"
+
+
+def percent(share: float) -> str:
+    """A share in percent, with a decimal where it is near an end."""
+    value = 100.0 * float(share)
+    if math.isnan(value):
+        return "–"
+    return f"{value:.0f} %" if value in (0.0, 100.0) or 5.0 <= value <= 95.0 else f"{value:.1f} %"
+
+
+def signed(share: float) -> str:
+    """A difference in percentage points, with its sign."""
+    value = 100.0 * float(share)
+    return "–" if math.isnan(value) else f"{value:+.1f} %".replace("-", "−").replace("+0.0", "0").replace("−0.0", "0")
+
+
+def _quantiles(values: Array, unit: str, beyond: str) -> str:
+    """Median and the outer quantiles, which most readers take for a range."""
+    if np.isnan(values).any():
+        return "–, nothing failed"
+    if np.isinf(values).all():
+        return beyond
+    low, median, high = (beyond if math.isinf(v) else f"{v:.2g} {unit}" for v in values)
+    return f"median {median}, 10 to 90 % of flights {low} to {high}"
+
+
+# ---------------------------------------------------------------------------------------------------------- charts
+
+
+def _heat(
+    maps: Maps, part: Slice, values: Array, cells: NDArray[np.object_], chosen: Sequence[str],
+    ends: tuple[float, float], name: str,
+) -> Spec:  # fmt: skip
+    x, y = (places(view).tolist() for view in maps.views[:2])
+    inside = part.of(cells)
+    return {
+        "type": "heatmap",
+        "x": x,
+        "y": y,
+        "z": _nullable(part.of(values).T),
+        "zmin": ends[0],
+        "zmax": ends[1],
+        "colorscale": [[i / (len(chosen) - 1), colour] for i, colour in enumerate(chosen)],
+        "colorbar": {"thickness": 14, "title": {"text": name}},
+        "customdata": [[inside[i, j].as_data() for i in range(len(x))] for j in range(len(y))],
+        "hovertemplate": "<b>%{customdata[0]}</b><br>%{customdata[1]}<extra></extra>",
+        "hoverongaps": True,
+        "name": name,
+    }
+
+
+def _line(maps: Maps, values: Array, lower: Array, upper: Array, cells: NDArray[np.object_], name: str) -> Spec:
+    x = maps.views[0]
+    return {
+        "type": "scatter",
+        "mode": "lines+markers" if x.numeric else "markers",
+        "x": places(x).tolist(),
+        "y": _nullable(values),
+        "error_y": {
+            "type": "data", "symmetric": False, "thickness": 1.2, "width": 3,
+            "array": np.nan_to_num(upper - values).tolist(), "arrayminus": np.nan_to_num(values - lower).tolist(),
+        },
+        "line": {"color": BLUE},
+        "marker": {"size": 8},
+        "customdata": [cell.as_data() for cell in cells],
+        "hovertemplate": "<b>%{customdata[0]}</b><br>%{customdata[1]}<extra></extra>",
+        "name": name,
+        "showlegend": False,
+    }  # fmt: skip
+
+
+def _curve(maps: Maps, lines: Sequence[Array], name: str, style: Spec) -> list[Spec]:
+    """Several lines as one trace, with gaps between."""
+    if not lines:
+        return []
+    x, y = maps.views[:2]
+    xs: list[float | None] = []
+    ys: list[float | None] = []
+    for line in lines:
+        xs += [*x.drawn(line[:, 0]).round(5).tolist(), None]
+        ys += [*y.drawn(line[:, 1]).round(5).tolist(), None]
+    return [{"type": "scatter", "mode": "lines", "x": xs, "y": ys, "line": style, "hoverinfo": "skip", "name": name}]
+
+
+def _bars(maps: Maps, found: Crossings, name: str) -> list[Spec]:
+    """Intervals of crossings; where open, no bar."""
+    x, y = maps.views[:2]
+    traces = []
+    for axis, view in enumerate((x, y)):
+        mine = found.along == axis
+        at = np.column_stack([x.drawn(found.points[mine, 0]), y.drawn(found.points[mine, 1])])
+        middle = at[:, axis]
+        ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower[mine], found.upper[mine])]
+        bar = {
+            "type": "data", "symmetric": False, "color": GREY_BAR, "thickness": 1, "width": 2,
+            "arrayminus": (middle - ends[0]).round(5).tolist(), "array": (ends[1] - middle).round(5).tolist(),
+        }  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers",
+                "x": at[:, 0].round(5).tolist(), "y": at[:, 1].round(5).tolist(),
+                "marker": {"color": BLACK, "size": 3}, "error_x" if axis == 0 else "error_y": bar,
+                "hoverinfo": "skip", "name": f"interval of {name}", "showlegend": False,
+            }
+        )  # fmt: skip
+    return [trace for trace in traces if trace["x"]]
+
+
+def _nullable(values: Array) -> list[Any]:
+    """Nested lists with None for NaN, which JSON does not have."""
+    found = np.round(values, 5).astype(object)
+    found[~np.isfinite(values)] = None
+    listed: list[Any] = found.tolist()
+    return listed
+
+
+def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | None = None) -> Spec:
+    axes = [_axis(view) for view in views]
+    if len(axes) == 1:
+        axes.append({"title": {"text": title}, "range": list(ends or (0.0, 1.0)), "gridcolor": "#e4e4e4"})
+    return {
+        "xaxis": axes[0],
+        "yaxis": axes[1],
+        "height": HEIGHT,
+        "margin": {"l": 60, "r": 10, "t": 30, "b": 50},
+        "plot_bgcolor": "#d9d9d9" if len(views) == 2 else "white",
+        "paper_bgcolor": "white",
+        "font": {"family": "system-ui, sans-serif", "size": 12},
+        "hovermode": "closest",
+        "hoverlabel": {"align": "left", "bgcolor": "white", "font": {"color": BLACK}, "bordercolor": GREY_LINE},
+        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
+        "dragmode": "pan",
+        "shapes": [],
+    }
+
+
+def _axis(view: View) -> Spec:
+    edges = borders(view)
+    found: Spec = {
+        "title": {"text": label(view)}, "zeroline": False, "showgrid": False, "ticks": "outside",
+        "range": [float(edges[0]), float(edges[-1])],
+    }  # fmt: skip
+    at, texts = ticks(view)
+    return found | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": texts}

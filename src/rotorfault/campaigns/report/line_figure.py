@@ -1,0 +1,132 @@
+"""Studies with one axis: survival and differences as lines with intervals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rotorfault.campaigns.report.axis_drawing import label, legend_columns, places, scale_x
+from rotorfault.campaigns.report.curves import LEVELS, Slice, crossings, edges
+from rotorfault.campaigns.report.maps import Maps
+from rotorfault.report.style import BLACK, COLOURS, GREY, LINES, new_figure, shown
+
+LINE = Slice("", (slice(None),))
+# Black, as colours are those of the variants.
+WITH_YAW: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.2}
+WITHOUT_YAW: dict[str, Any] = {"color": BLACK, "linestyle": (0, (2.4, 1.2)), "linewidth": 1.2}
+
+
+def look(k: int) -> dict[str, Any]:
+    """Colour and kind of line of the k-th variant."""
+    return {"color": COLOURS[k % len(COLOURS)], "linestyle": LINES[k // len(COLOURS) % len(LINES)]}
+
+
+def survival_lines(maps: Maps) -> Figure:
+    """Survival with the intervals of its cells, and where it crosses the levels; below, the number of flights."""
+    figure = new_figure(11.0)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
+    x = maps.views[0]
+    at = places(x)
+    handles: dict[str, Artist] = {}
+    beside = _beside(maps)
+    for k, variant in enumerate(maps.variants):
+        style = look(k)
+        line = style if x.numeric else {**style, "linestyle": "none"}
+        above.plot(at, variant.survival, marker="o", markersize=3.0, **line)
+        reach = [variant.survival - variant.lower, variant.upper - variant.survival]
+        above.errorbar(
+            at + beside[k],
+            variant.survival,
+            yerr=np.nan_to_num(reach),
+            fmt="none",
+            ecolor=style["color"],
+            elinewidth=0.7,
+        )
+        below.plot(at, np.where(variant.flights > 0, variant.flights, np.nan), marker="o", markersize=3.0, **line)
+        handles[shown(variant.label, 30)] = Line2D([], [], marker="o", markersize=3.0, **style)
+        for level in LEVELS:
+            _crossing(above, maps, k, level)
+    for level in LEVELS:
+        above.axhline(level, color=GREY, linewidth=0.6, zorder=1.0)
+    _limits(above, maps, handles)
+    above.set_ylim(-0.03, 1.05)
+    above.set_ylabel("survival (–)")
+    below.set_ylim(0.0, 1.08 * max(int(variant.flights.max()) for variant in maps.variants))
+    below.set_ylabel("flights (–)")
+    _finish(figure, below, maps, handles)
+    return figure
+
+
+def difference_lines(maps: Maps) -> Figure:
+    """Differences of survival with the intervals of their cells; filled where significant."""
+    figure = new_figure(7.5)
+    axes = figure.subplots()
+    at = places(maps.views[0])
+    handles: dict[str, Artist] = {}
+    width = _width(maps)
+    for k, pair in enumerate(maps.pairings):
+        style = {**look(k), "linestyle": "none"}
+        here = at + width * (k - 0.5 * (len(maps.pairings) - 1)) / len(maps.pairings)
+        estimate, lower, upper = pair.difference
+        reach = np.nan_to_num([estimate - lower, upper - estimate])
+        axes.errorbar(here, estimate, yerr=reach, fmt="none", ecolor=style["color"], elinewidth=0.7)
+        for which, fill in ((pair.significant, style["color"]), (~pair.significant, "white")):
+            axes.plot(here[which], estimate[which], marker="o", markersize=3.6, markerfacecolor=fill, **style)
+        handles[shown(f"{pair.first} less {pair.second}", 40)] = Line2D([], [], marker="o", markersize=3.6, **style)
+    handles["significant after Holm's correction: filled"] = Line2D(
+        [], [], marker="o", markersize=3.6, color=BLACK, linestyle="none"
+    )
+    axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.0)
+    axes.set_ylim(-1.05, 1.05)
+    axes.set_ylabel("difference of survival (–)")
+    _finish(figure, axes, maps, handles)
+    return figure
+
+
+def _width(maps: Maps) -> float:
+    """Over which marks of one cell are spread, so that none hides another."""
+    at = places(maps.views[0])
+    return 0.2 * float(np.diff(at).min()) if len(at) > 1 else 0.2
+
+
+def _beside(maps: Maps) -> list[float]:
+    count = len(maps.variants)
+    return [_width(maps) * (k - 0.5 * (count - 1)) / count for k in range(count)]
+
+
+def _crossing(axes: Axes, maps: Maps, k: int, level: float) -> None:
+    """The interval of a crossing lies on the level's line."""
+    x, found = maps.views[0], crossings(maps, maps.variants[k], LINE, level)
+    for point, lower, upper in zip(found.points[:, 0], found.lower, found.upper, strict=True):
+        ends = [x.drawn(np.array([point if np.isnan(end) else end]))[0] for end in (lower, upper)]
+        colour = look(k)["color"]
+        axes.plot(ends, [level, level], color=colour, linewidth=2.4, alpha=0.45, solid_capstyle="butt")
+        axes.plot(x.drawn(np.array([point])), [level], color=colour, marker="|", markersize=7.0, markeredgewidth=1.4)
+
+
+def _limits(axes: Axes, maps: Maps, handles: dict[str, Artist]) -> None:
+    """Limits of hover; of variants that share them once."""
+    drawn: set[tuple[str, float]] = set()
+    for k in range(len(maps.variants)):
+        found = edges(maps, k, LINE)
+        for text, style, places_of in (
+            ("limit of hover, yaw held", WITH_YAW, found.with_yaw if found else []),
+            ("limit of hover, yaw given up", WITHOUT_YAW, found.without_yaw if found else []),
+        ):
+            for point in places_of:
+                if (key := (text, round(float(point[0, 0]), 9))) not in drawn:
+                    axes.axvline(float(maps.views[0].drawn(point[:, 0])[0]), **style)
+                    handles[text] = Line2D([], [], **style)
+                    drawn.add(key)
+
+
+def _finish(figure: Figure, lowest: Axes, maps: Maps, handles: dict[str, Artist]) -> None:
+    scale_x(lowest, maps.views[0])
+    lowest.set_xlabel(label(maps.views[0]))
+    figure.align_ylabels()
+    figure.legend(list(handles.values()), list(handles), loc="outside upper center", ncols=legend_columns(handles))

@@ -1,0 +1,156 @@
+"""The report of a campaign as one HTML page that opens offline: interactive maps, tables, figures, commands."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shlex
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import NDArray
+from plotly.offline import get_plotlyjs
+
+from rotorfault.campaigns import charts, grades
+from rotorfault.campaigns.block import RECOVERED
+from rotorfault.campaigns.report.charts import signed
+from rotorfault.campaigns.report.curves import slices
+from rotorfault.campaigns.report.maps import Maps
+from rotorfault.campaigns.sampling.paired import Difference
+from rotorfault.campaigns.sampling.statistics import Array
+
+MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
+MEANINGS = {
+    "tracked": f"flew to its end; over the last half within {grades.TRACKED:g} m (root mean square) and "
+    f"{grades.YAW:g} rad of yaw",
+    "yaw given up": f"the same in position (up to {grades.BOUNDED:g} m), but yaw was off by more",
+    "degraded": f"flew to its end with a bounded offset, {grades.TRACKED:g} m to {grades.BOUNDED:g} m",
+    "controlled descent": f"came down upright (within {np.degrees(grades.UPRIGHT):.0f} degrees) at no more than "
+    f"{grades.DESCENT:g} m/s, or landed",
+    "ground": "hit the ground faster than that, or tilted",
+    "tumbled": "tilted beyond 90 degrees in the air",
+    "diverged": f"a state is not finite or 10 km away, or the vehicle flew on more than {grades.BOUNDED:g} m off",
+}
+
+
+def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mapping[str, Path]) -> str:
+    """The page's HTML.
+
+    Parameters
+    ----------
+    maps : Maps
+    folder : Path
+        Of the campaign, as commands shall name it.
+    versions : mapping of str to str
+        With which the campaign was flown.
+    figures : mapping of str to Path
+        SVG files to be shown: ``outcomes`` and ``recovery``.
+    """
+    template = (resources.files("rotorfault.campaigns.report") / "campaign.html.j2").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    cells = [charts.variant_cells(maps, k, folder) for k in range(len(maps.variants))]
+    sections = _sections(maps, folder, cells)
+    rows = [
+        {"variant": variant.label, "cell": int(variant.cell[at]), "said": mine[at]}
+        for variant, mine in zip(maps.variants, cells, strict=True)
+        for at in np.ndindex(*variant.cell.shape)
+    ]
+    return environment.from_string(template).render(
+        study=maps.study,
+        maps=maps,
+        seeds=f"{maps.study.seed}; a flight's draws and seed follow from it, its cell and its number within the cell",
+        versions=versions,
+        meanings=MEANINGS,
+        recovered=f"{RECOVERED:g}",
+        axes=[_axis(maps, k) for k in range(len(maps.views))],
+        totals=[_total(maps, k) for k in range(len(maps.variants))],
+        differences=[
+            {"pair": f"{pair.first} less {pair.second}", "difference": _interval(pair.total, signed),
+             "significant": int(pair.significant.sum())}
+            for pair in maps.pairings
+        ],
+        sections=[{k: v for k, v in section.items() if k != "spec"} for section in sections],
+        specs=_script([section["spec"] for section in sections]),
+        slices=slices(maps),
+        level=f"{100.0 * maps.study.refine.level:.4g} %",
+        error=f"{100.0 * (1.0 - maps.study.refine.level):.3g} %",
+        rows=rows[:MOST_ROWS],
+        cut=len(rows) - MOST_ROWS if len(rows) > MOST_ROWS else 0,
+        folder=shlex.quote(str(folder)),
+        figures={name: base64.b64encode(path.read_bytes()).decode("ascii") for name, path in figures.items()},
+        plotly=Markup(get_plotlyjs()),
+    )  # fmt: skip
+
+
+def _sections(maps: Maps, folder: Path, cells: list[NDArray[np.object_]]) -> list[dict[str, Any]]:
+    """The interactive charts, with a title each."""
+    one = len(maps.views) == 1
+    parts = [] if one else slices(maps)[0]
+    found: list[dict[str, Any]] = []
+    for k, variant in enumerate(maps.variants):
+        if one:
+            found.append(_section("survival", variant.label, "", charts.survival_lines_chart(maps, k, cells[k])))
+        found += [
+            _section("survival", variant.label, part.title, charts.survival_chart(maps, k, part, cells[k]))
+            for part in parts
+        ]
+    for k, pair in enumerate(maps.pairings):
+        mine, title = charts.pairing_cells(maps, k, folder), f"{pair.first} less {pair.second}"
+        if one:
+            found.append(_section("difference", title, "", charts.difference_lines_chart(maps, k, mine)))
+        found += [
+            _section("difference", title, part.title, charts.difference_chart(maps, k, part, mine)) for part in parts
+        ]
+    return found
+
+
+def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, Any]:
+    return {"kind": kind, "title": f"{title}: {part}" if part else title, "spec": spec}
+
+
+def _axis(maps: Maps, k: int) -> str:
+    view = maps.views[k]
+    ends = f"{view.said(0)} to {view.said(len(view.values) - 1)}" if view.numeric else ", ".join(
+        view.said(i) for i in range(len(view.values))
+    )  # fmt: skip
+    unit = f" {view.unit}" if view.unit not in ("", "1") else ""
+    return f"{view.title}: {ends}{unit}, {len(view.values)} values"
+
+
+def _total(maps: Maps, k: int) -> dict[str, Any]:
+    variant = maps.variants[k]
+    held = free = "not known"
+    if variant.possible is not None:
+        held, free = (_cells(each) for each in variant.possible)
+    return {
+        "variant": variant.label,
+        "flights": int(variant.flights.sum()),
+        "cells": int((variant.flights > 0).sum()),
+        "survival": _interval(variant.total, lambda share: f"{100.0 * share:.1f} %"),
+        "held": held,
+        "free": free,
+    }
+
+
+def _cells(possible: Array) -> str:
+    """In how many cells hover is possible."""
+    depends = int(np.isnan(possible).sum())
+    return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")
+
+
+def _interval(found: Difference, text: Callable[[float], str]) -> str:
+    estimate, lower, upper = (float(each) for each in found)
+    if np.isnan(estimate):
+        return "–"
+    return f"{text(estimate)} ({text(max(lower, -1.0))} to {text(min(upper, 1.0))})"
+
+
+def _script(data: object) -> Markup:
+    """Data for a script element: nothing in it can end the element."""
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c"))

@@ -1,0 +1,48 @@
+"""Pictures and page of a campaign, in its folder: figures/ and report.html."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pyarrow as pa
+
+from rotorfault.base.files import write_atomically
+from rotorfault.campaigns.report.figures import draw
+from rotorfault.campaigns.report.maps import maps
+from rotorfault.campaigns.report.page import render
+from rotorfault.campaigns.study import Study
+from rotorfault.report.figures import save
+
+FIGURES, PAGE = "figures", "report.html"
+
+
+def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, str]) -> list[Path]:
+    """Make pictures and page of a campaign from its table.
+
+    Parameters
+    ----------
+    study : Study
+    table : pyarrow.Table
+        All flights, or those there are so far.
+    folder : Path
+        Of the campaign.
+    versions : mapping of str to str
+        With which it was flown.
+
+    Returns
+    -------
+    list of Path
+        The page first, then the figures.
+
+    Raises
+    ------
+    InputError
+        If no cell has a whole round yet, or the folder cannot be written.
+    """
+    found = maps(study, table)
+    figures = save(draw(found), folder / FIGURES, ("png", "svg"))
+    shown = {path.stem: path for path in figures if path.suffix == ".svg" and path.stem in ("outcomes", "recovery")}
+    text, page = render(found, folder, versions, shown), folder / PAGE
+    write_atomically(page, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return [page, *figures]

@@ -1,0 +1,1 @@
+"""Which flights a campaign flies: plan, refinement, statistics."""

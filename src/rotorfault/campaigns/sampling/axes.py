@@ -1,0 +1,129 @@
+"""What a study may vary, by name: an axis stands for one or several keys of a scenario.
+
+Any dotted key of the scenario is an axis too (``controller.law.weights.error_floor.0``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.base.errors import InputError
+from rotorfault.base.registry import unknown
+
+Columns = dict[str, NDArray[Any]]
+
+
+class Axis(NamedTuple):
+    """A quantity that a study may vary."""
+
+    unit: str
+    about: str
+    keys: Callable[[Mapping[str, NDArray[Any]]], Columns]  # values of all axes to columns of the scenario
+    range: tuple[float, float] = (-np.inf, np.inf)  # of numbers that make sense
+
+
+def _key(name: str, *keys: str, scale: Callable[[Any], Any] = lambda x: x) -> Callable[[Mapping[str, Any]], Columns]:
+    return lambda values: {key: scale(values[name]) for key in keys}
+
+
+def _wind(values: Mapping[str, NDArray[Any]]) -> Columns:
+    speed = np.asarray(values.get("wind_speed", 0.0), dtype=float)
+    direction = np.asarray(values.get("wind_direction", 0.0), dtype=float)
+    speed, direction = np.broadcast_arrays(speed, direction)
+    return {
+        "wind.velocity_W.0": np.round(speed * np.cos(direction), 12),
+        "wind.velocity_W.1": np.round(speed * np.sin(direction), 12),
+    }
+
+
+def _onset(values: Mapping[str, NDArray[Any]]) -> Columns:
+    return {} if "ramp" in values else {"fault.0.time": values["onset"]}
+
+
+def _ramp(values: Mapping[str, NDArray[Any]]) -> Columns:
+    if "onset" not in values:
+        raise InputError("axis 'ramp' needs 'onset', when it begins; give it as an axis or a draw too")
+    onset = np.asarray(values["onset"], dtype=float)
+    start, length = np.broadcast_arrays(onset, np.asarray(values["ramp"], dtype=float))
+    return {"fault.0.start": np.array(start), "fault.0.end": start + np.maximum(length, 1e-3)}
+
+
+_NOISE = {"position": 0.005, "velocity": 0.01, "attitude": 0.002, "rate": 0.005}  # defaults of `noisy`
+
+AXES: dict[str, Axis] = {
+    "rotor": Axis("", "rotor of the first fault, 1 to 4", _key("rotor", "fault.0.rotor"), (1, 4)),
+    "loss": Axis("1", "loss of the first fault", _key("loss", "fault.0.loss"), (0.0, 1.0)),
+    "onset": Axis("s", "time of the first fault", _onset, (0.0, np.inf)),
+    "ramp": Axis("s", "length of the first fault's ramp (kind ramp), which begins at onset", _ramp, (0.0, np.inf)),
+    "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, 4)),
+    "second_loss": Axis("1", "loss of the second fault", _key("second_loss", "fault.1.loss"), (0.0, 1.0)),
+    "second_onset": Axis("s", "time of the second fault", _key("second_onset", "fault.1.time"), (0.0, np.inf)),
+    "wind_speed": Axis("m/s", "speed of the mean wind, over ground", _wind, (0.0, 100.0)),
+    "wind_direction": Axis("rad", "where it blows to, from x towards y", _wind),
+    "gust_intensity": Axis(
+        "m/s", "wind at 6 m that gusts go with (wind dryden)", _key("gust_intensity", "wind.wind_at_6m"), (0.0, 100.0)
+    ),
+    "mass": Axis("1", "true over believed mass", _key("mass", "mismatch.mass"), (0.0, np.inf)),
+    "inertia": Axis(
+        "1", "true over believed inertia, all axes",
+        _key("inertia", *(f"mismatch.inertia.{i}" for i in range(3))), (0.0, np.inf),
+    ),
+    "drag": Axis("1", "true over believed drag", _key("drag", "mismatch.linear_drag"), (0.0, np.inf)),
+    "rotor_bandwidth": Axis(
+        "1", "true over believed rotor bandwidth", _key("rotor_bandwidth", "mismatch.rotor_bandwidth"), (0.0, np.inf)
+    ),
+    "battery_sag": Axis(
+        "1", "lost share of all rotors' thrust per command",
+        _key("battery_sag", "mismatch.rotor_gain", scale=lambda x: 1.0 - np.asarray(x, dtype=float)), (0.0, 0.99),
+    ),
+    "sensor_noise": Axis(
+        "1", "factor on the standard noise (sensors noisy)",
+        lambda values: {
+            f"sensors.{name}": np.asarray(values["sensor_noise"], dtype=float) * sigma
+            for name, sigma in _NOISE.items()
+        },
+        (0.0, np.inf),
+    ),
+    "sensor_delay": Axis(
+        "", "sampling periods by which measurements come late (sensors noisy)", _key("sensor_delay", "sensors.delay"),
+        (0, 100),
+    ),
+    "sampling_period": Axis("s", "sampling period", _key("sampling_period", "period"), (0.0, 1.0)),
+    "detection_delay": Axis(
+        "s", "delay of the diagnosis (kind delayed)", _key("detection_delay", "diagnosis.delay"), (0.0, np.inf)
+    ),
+    "vehicle": Axis("", "vehicle", _key("vehicle", "vehicle")),
+    "controller": Axis("", "controller", _key("controller", "controller.kind")),
+    "preset": Axis("", "preset of the controller", _key("preset", "controller.preset")),
+    "diagnosis": Axis("", "source of diagnosis", _key("diagnosis", "diagnosis.kind")),
+    "allocator": Axis("", "control allocation", _key("allocator", "allocation.kind")),
+}  # fmt: skip
+
+
+def axis(name: str) -> Axis:
+    """An axis by name, or for a dotted key of the scenario.
+
+    Raises
+    ------
+    InputError
+        If there is no such axis.
+    """
+    if name in AXES:
+        return AXES[name]
+    if "." in name:
+        return Axis("", f"key {name} of the scenario", _key(name, name))
+    raise InputError(f"{unknown('axis', name, list(AXES))}; or give a dotted key of the scenario")
+
+
+def columns(values: Mapping[str, NDArray[Any]]) -> Columns:
+    """Columns of the scenario for values of axes, one per flight."""
+    count = max((len(np.atleast_1d(v)) for v in values.values()), default=1)
+    found: Columns = {}
+    for name in values:
+        for key, column in axis(name).keys(values).items():
+            found[key] = np.array(np.broadcast_to(column, (count,)))
+    return found

@@ -1,0 +1,98 @@
+"""What may lie in a campaign's folder, and the ways in which it is changed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import is_leftover, write_durably
+from rotorfault.campaigns.store.identity import Identity, read_identity
+
+STUDY, PARTS, DAMAGED, LOCK, FLIGHTS = "study.json", "parts", "damaged", "lock", "flights.parquet"
+
+
+def see_that_it_is_vacant(folder: Path, wanted: Identity) -> None:
+    """Whether a campaign can start here; what a kill at its very start leaves is no hindrance.
+
+    Raises
+    ------
+    InputError
+        If the folder is a file, or holds a campaign or anything else.
+    """
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is a file; give another --out")
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+        if STUDY in names:
+            kept = read_identity(folder / STUDY)
+            other = kept.unlike(wanted.study, wanted.program)
+            known = "holds this campaign already; complete it with --resume, or give another --out"
+            raise InputError(f"{folder}: {other or known}")
+        ours = [name for name in names if name in (LOCK, PARTS) or is_leftover(name)]
+        foreign = [name for name in names if name not in ours]
+        if PARTS in names:
+            parts = folder / PARTS
+            inside = sorted(path.name for path in parts.iterdir()) if parts.is_dir() else [""]
+            foreign += [f"{PARTS}/{name}".rstrip("/") for name in inside if not is_leftover(name)]
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); give another --out") from None
+    if foreign:
+        more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
+        raise InputError(f"{folder}: holds files that are not of a campaign ({foreign[0]}{more}); give another --out")
+
+
+def see_that_there_is_space(folder: Path, needed: int) -> None:
+    """Whether the disk that the folder is or will be on has as many bytes left.
+
+    Raises
+    ------
+    InputError
+        If it has not.
+    """
+    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    free = shutil.disk_usage(place).free
+    if free < needed:
+        raise InputError(
+            f"{folder}: the results take about {_size(needed)}, but only {_size(free)} are free; "
+            "make room or give another --out"
+        )
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.1f} MB"
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove the unfinished files of a killed run; only for who holds the lock."""
+    for path in [*folder.glob(".*.tmp"), *(folder / PARTS).glob(".*.tmp")]:
+        if is_leftover(path.name):
+            path.unlink(missing_ok=True)
+
+
+def move_aside(folder: Path, name: str) -> None:
+    """Move a part to ``damaged/``, beside others of its name."""
+    place = folder / DAMAGED
+    place.mkdir(exist_ok=True)
+    target, number = place / name, 1
+    while target.exists():
+        target, number = place / f"{name}.{number}", number + 1
+    (folder / PARTS / name).rename(target)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file of a campaign, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    try:
+        write_durably(path, content)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror}); mend that and go on with --resume; what was flown is kept"
+        ) from None

@@ -1,0 +1,142 @@
+"""What makes two campaigns the same: study, program and libraries; kept in ``study.json``."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+
+from rotorfault.base.errors import InputError
+from rotorfault.base.versions import versions
+
+FORMAT = 1  # of the folder
+# Numbers of a flight may change with these. The other versions are kept for the record.
+_DECIDING = ("rotorfault", "numpy", "scipy", "llvmlite")
+_MEND = "restore it from a copy, or start the campaign anew with another --out"
+
+
+class Identity(NamedTuple):
+    """Of a campaign."""
+
+    study: dict[str, Any]
+    program: str  # digest of the source that decides numbers
+    versions: dict[str, str]
+
+    @property
+    def study_digest(self) -> str:
+        """SHA-256 of the study."""
+        return _digest(self.study)
+
+    @property
+    def campaign(self) -> str:
+        """SHA-256 of all that decides numbers; every part bears it."""
+        return _digest([FORMAT, self.study, self.program, {name: self.versions.get(name) for name in _DECIDING}])
+
+    def encoded(self) -> bytes:
+        """Content of ``study.json``."""
+        content = {"format": FORMAT, "study": self.study, "versions": self.versions}
+        digests = {"study": self.study_digest, "program": self.program, "campaign": self.campaign}
+        content["digests"] = {**digests, "file": _digest([content, digests])}
+        return (json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+    def unlike(self, study: dict[str, Any] | None, program: str | None) -> str | None:
+        """Why this campaign, as it is kept, is not that of a study and a program here; None if it is.
+
+        Parameters
+        ----------
+        study : dict or None
+        program : str or None
+            Not compared where None.
+        """
+        if study is not None and (found := _first_difference(self.study, _plain(study))):
+            return f"holds a campaign of another study ({found}); give another --out"
+        if program is None:
+            return None
+        here = _versions()
+        other = [name for name in _DECIDING if self.versions.get(name) != here.get(name)]
+        if other:
+            there = ", ".join(f"{name} {self.versions.get(name)}" for name in other)
+            now = ", ".join(f"{name} {here.get(name)}" for name in other)
+            return f"was flown with {there}, here is {now}; give another --out, or --resume with {there}"
+        if program != self.program:
+            return (
+                f"was flown by other source of rotorfault {here['rotorfault']} (digest {self.program[:12]}, here "
+                f"{program[:12]}); give another --out, or --resume with that source"
+            )
+        return None
+
+
+def identity(study: dict[str, Any], program: str) -> Identity:
+    """Of a study flown here and now.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the study is not plain data.
+    """
+    return Identity(_plain(study), program, _versions())
+
+
+def read_identity(path: Path) -> Identity:
+    """What ``study.json`` holds.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is damaged, or was written by a later version.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+        kept = content["format"]
+        if isinstance(kept, int) and kept > FORMAT:
+            version = content["versions"]["rotorfault"]
+            raise InputError(
+                f"{path}: has format {kept}; this version reads up to {FORMAT}; use rotorfault {version}"
+            )
+        found = Identity(content["study"], content["digests"]["program"], content["versions"])
+        if json.loads(found.encoded()) != content:
+            raise InputError(f"{path}: has changed since it was written; {_MEND}")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); mend that") from None
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError(f"{path}: is damaged or was not written by rotorfault; {_MEND}") from None
+    return found
+
+
+def _versions() -> dict[str, str]:
+    return {**versions(), "pyarrow": pa.__version__}
+
+
+def _plain(study: dict[str, Any]) -> dict[str, Any]:
+    # As it will be read back: lists for tuples.
+    plain: dict[str, Any] = json.loads(json.dumps(study, allow_nan=False))
+    return plain
+
+
+def _digest(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, allow_nan=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _first_difference(there: Any, here: Any, key: str = "") -> str | None:
+    """The first key in which two studies differ, with both values."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        pairs = {name: (there.get(name), here.get(name)) for name in [*there, *here]}
+    elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
+        pairs = {str(i): pair for i, pair in enumerate(zip(there, here, strict=True))}
+    else:
+        # 1 and 1.0 are the same number; true is none.
+        same = there == here and isinstance(there, bool) == isinstance(here, bool)
+        return None if same else f"{key}: {_short(there)} there, {_short(here)} here"
+    found = (_first_difference(*pair, f"{key}.{name}" if key else name) for name, pair in pairs.items())
+    return next((one for one in found if one), None)
+
+
+def _short(value: Any) -> str:
+    text = "nothing" if value is None else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 40 else f"{text[:37]}..."

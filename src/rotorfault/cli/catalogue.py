@@ -1,0 +1,129 @@
+"""What there is: everything registered, templates for new files, and checks of files."""
+
+from __future__ import annotations
+
+import importlib
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from rotorfault.autopilot.allocation import ALLOCATORS
+from rotorfault.autopilot.control import CONTROLLERS, RESPONSES
+from rotorfault.autopilot.diagnosis import DIAGNOSES
+from rotorfault.autopilot.presets import presets
+from rotorfault.base.config import parse_toml, read_text
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import output_folder, write_atomically
+from rotorfault.base.registry import Registry, unknown
+from rotorfault.campaigns.studies import study_names
+from rotorfault.engine import ENGINES
+from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
+from rotorfault.plant import FAULTS, PLANTS, SENSORS, WINDS
+from rotorfault.reference.sources import REFERENCES
+from rotorfault.scenario.scenario import load_scenario, new_scenario, scenario_from, scenario_names
+
+REGISTRIES: dict[str, Registry[Any]] = {
+    "controllers": CONTROLLERS,
+    "plants": PLANTS,
+    "references": REFERENCES,
+    "winds": WINDS,
+    "faults": FAULTS,
+    "sensors": SENSORS,
+    "diagnoses": DIAGNOSES,
+    "allocators": ALLOCATORS,
+    "responses": RESPONSES,
+}
+
+
+def entries() -> dict[str, dict[str, str]]:
+    """One line about each thing, by group and name."""
+    found: dict[str, dict[str, str]] = {
+        "scenarios": {name: _description("rotorfault.scenario.builtin", name) for name in scenario_names()},
+        "vehicles": {name: _description("rotorfault.model.vehicles", name) for name in vehicle_names()},
+    }
+    for group, registry in REGISTRIES.items():
+        found[group] = {name: registry.summary(name) for name in registry}
+    for name in found["controllers"]:
+        known = presets(name)
+        found["controllers"][name] += f" Presets: {', '.join(known)}." if known else ""
+    found["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
+    found["engines"] = {name: about for name, (_, about) in ENGINES.items()}
+    return found
+
+
+def _description(package: str, name: str) -> str:
+    text = (resources.files(package) / f"{name}.toml").read_text(encoding="utf-8")
+    return str(tomllib.loads(text).get("description", ""))
+
+
+def text(group: str | None = None) -> str:
+    """Everything registered, one line each; only one group if it is named.
+
+    Raises
+    ------
+    InputError
+        If there is no such group.
+    """
+    every = entries()
+    if group is not None and group not in every:
+        raise InputError(unknown("group", group, list(every)))
+    shown = every if group is None else {group: every[group]}
+    width = max(len(name) for names in shown.values() for name in names)
+    blocks = []
+    for title, names in shown.items():
+        blocks.append("\n".join([title, *(f"  {name.ljust(width)}  {about}" for name, about in names.items())]))
+    return "\n\n".join(blocks)
+
+
+def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
+    """Write a template; its path.
+
+    Raises
+    ------
+    InputError
+        If it is neither vehicle nor scenario, the name is no file name, the file exists, or the folder cannot be
+        written.
+    """
+    makers = {"vehicle": new_vehicle, "scenario": new_scenario}
+    if what not in makers:
+        raise InputError(unknown("kind of file", what, list(makers)))
+    name = name.removesuffix(".toml")
+    if "/" in name or "\\" in name or name in (".", "..") or len(name.encode()) > 200:
+        raise InputError(f"name '{name}'; allowed: a plain, short name without folders; give the folder with --out")
+    content = makers[what](name)
+    path = output_folder(folder) / f"{name}.toml"
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists already; choose another name, or overwrite it with --force")
+    write_atomically(path, lambda temporary: temporary.write_text(content, encoding="utf-8"))
+    return path
+
+
+def check(path: Path) -> str:
+    """Validate a file; one line about what it holds.
+
+    Raises
+    ------
+    InputError
+        If anything in it is wrong.
+    """
+    if path.suffix == ".nc":
+        # xarray takes longer to load than all the rest, and only flight files need it.
+        dataset = importlib.import_module("rotorfault.results.dataset")
+        data = dataset.read_netcdf(path)
+        scenario = scenario_from(dataset.configuration(data, path), str(path))
+        return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
+    text = read_text(path)
+    if path.suffix != ".toml":
+        raise InputError(f"{path}: ends in '{path.suffix}'; allowed: .toml (vehicle, scenario) or .nc (flight)")
+    tables = parse_toml(text, str(path))
+    # A vehicle has rotors and a mass, a scenario a reference and a duration; a bad file may lack some of either.
+    if {"mass", "rotor", "inertia_x", "thrust_max"} & set(tables):
+        vehicle = load_vehicle(path)
+        return f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
+    scenario = load_scenario(path)
+    scenario.reference.make()
+    return (
+        f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on {scenario.plant} "
+        f"flown by {scenario.controller.kind}, {len(scenario.fault)} fault(s); ok"
+    )

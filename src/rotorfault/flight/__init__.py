@@ -1,0 +1,1 @@
+"""The verbs: assemble, fly, fly many."""

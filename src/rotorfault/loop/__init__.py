@@ -1,0 +1,1 @@
+"""One sampling period of truth and belief together, and what is counted of it."""

@@ -1,0 +1,1 @@
+"""Numbers and values: scalars of any number type, vectors and rotations, records."""

@@ -1,0 +1,396 @@
+"""Value types with operators, and rotations.
+
+`Vec3`, `Mat3`, `Quat` hold scalars of any kind (see `rotorfault.maths.scalar`), so equations read as in a paper:
+``thrust_W / mass + g_W``, ``omega.cross(J @ omega)``, ``Y.T @ Y``. `PerRotor` holds one scalar per rotor, in the
+order rotor 1, 2, 3, 4, and works elementwise.
+
+Conventions: the world frame W has x forward, y left, z up; the body frame B is the same at zero attitude. A
+rotation matrix ``R_WB`` takes body coordinates to world coordinates. Quaternions are Hamilton's, scalar first
+(w, x, y, z), body to world; this file is the only place that knows the order. Euler angles are (roll, pitch, yaw)
+with ``R_WB = Rz(yaw) Ry(pitch) Rx(roll)``, so positive pitch is nose down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import ClassVar, overload
+
+from rotorfault.maths.scalar import Scalar, atan2, cos, reciprocal, sin, sqrt
+
+
+class Value:
+    """A fixed number of scalars under names. Immutable by convention; subclasses add operators."""
+
+    __slots__: ClassVar[tuple[str, ...]] = ()
+    # Without this, ndarray * Vec3 would be broadcast by NumPy into an array of objects.
+    __array_ufunc__ = None
+
+    def __iter__(self) -> Iterator[Scalar]:
+        return (getattr(self, name) for name in self.__slots__)
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__slots__)
+        return f"{type(self).__name__}({inside})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and all(a == b for a, b in zip(self, other, strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Vec3(Value):
+    """Three components along x, y, z of one frame."""
+
+    __slots__ = ("x", "y", "z")
+
+    def __init__(self, x: Scalar, y: Scalar, z: Scalar) -> None:
+        self.x, self.y, self.z = x, y, z
+
+    @classmethod
+    def of(cls, components: Iterable[Scalar]) -> Vec3:
+        """Make a vector of three components in an iterable."""
+        x, y, z = components
+        return cls(x, y, z)
+
+    def __add__(self, other: Vec3) -> Vec3:
+        return Vec3(self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __sub__(self, other: Vec3) -> Vec3:
+        return Vec3(self.x - other.x, self.y - other.y, self.z - other.z)
+
+    def __neg__(self) -> Vec3:
+        return Vec3(-self.x, -self.y, -self.z)
+
+    def __mul__(self, factor: Scalar) -> Vec3:
+        return Vec3(self.x * factor, self.y * factor, self.z * factor)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, divisor: Scalar) -> Vec3:
+        return Vec3(self.x / divisor, self.y / divisor, self.z / divisor)
+
+    def times(self, other: Vec3) -> Vec3:
+        """Componentwise product."""
+        return Vec3(self.x * other.x, self.y * other.y, self.z * other.z)
+
+    def over(self, other: Vec3) -> Vec3:
+        """Componentwise quotient."""
+        return Vec3(self.x / other.x, self.y / other.y, self.z / other.z)
+
+    def map(self, function: Callable[[Scalar], Scalar]) -> Vec3:
+        """Apply a function to each component."""
+        return Vec3(function(self.x), function(self.y), function(self.z))
+
+    def dot(self, other: Vec3) -> Scalar:
+        """Scalar product."""
+        return self.x * other.x + self.y * other.y + self.z * other.z
+
+    def cross(self, other: Vec3) -> Vec3:
+        """Vector product."""
+        return Vec3(
+            self.y * other.z - self.z * other.y,
+            self.z * other.x - self.x * other.z,
+            self.x * other.y - self.y * other.x,
+        )
+
+    def norm(self) -> Scalar:
+        """Euclidean length."""
+        return sqrt(self.dot(self))
+
+
+class Mat3(Value):
+    """A 3x3 matrix, elements named by row and column."""
+
+    __slots__ = ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz")
+
+    def __init__(
+        self,
+        xx: Scalar, xy: Scalar, xz: Scalar,
+        yx: Scalar, yy: Scalar, yz: Scalar,
+        zx: Scalar, zy: Scalar, zz: Scalar,
+    ) -> None:  # fmt: skip
+        self.xx, self.xy, self.xz = xx, xy, xz
+        self.yx, self.yy, self.yz = yx, yy, yz
+        self.zx, self.zy, self.zz = zx, zy, zz
+
+    @classmethod
+    def diagonal(cls, d: Vec3) -> Mat3:
+        """Diagonal matrix."""
+        return cls(d.x, 0.0, 0.0, 0.0, d.y, 0.0, 0.0, 0.0, d.z)
+
+    @classmethod
+    def identity(cls) -> Mat3:
+        """Unit matrix."""
+        return cls(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+    @classmethod
+    def skew(cls, v: Vec3) -> Mat3:
+        """The matrix S with S u = v x u."""
+        return cls(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+
+    @property
+    def T(self) -> Mat3:
+        """Transpose."""
+        return Mat3(self.xx, self.yx, self.zx, self.xy, self.yy, self.zy, self.xz, self.yz, self.zz)
+
+    @property
+    def rows(self) -> tuple[Vec3, Vec3, Vec3]:
+        """The three rows."""
+        return (
+            Vec3(self.xx, self.xy, self.xz),
+            Vec3(self.yx, self.yy, self.yz),
+            Vec3(self.zx, self.zy, self.zz),
+        )
+
+    @property
+    def diag(self) -> Vec3:
+        """The diagonal."""
+        return Vec3(self.xx, self.yy, self.zz)
+
+    def map(self, function: Callable[[Scalar], Scalar]) -> Mat3:
+        """Apply a function to each element."""
+        return Mat3(*(function(element) for element in self))
+
+    def __add__(self, other: Mat3) -> Mat3:
+        return Mat3(*(a + b for a, b in zip(self, other, strict=True)))
+
+    def __sub__(self, other: Mat3) -> Mat3:
+        return Mat3(*(a - b for a, b in zip(self, other, strict=True)))
+
+    def __neg__(self) -> Mat3:
+        return Mat3(*(-a for a in self))
+
+    def __mul__(self, factor: Scalar) -> Mat3:
+        return Mat3(*(a * factor for a in self))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, divisor: Scalar) -> Mat3:
+        quotient: Mat3 = self * (1.0 / divisor)
+        return quotient
+
+    @overload
+    def __matmul__(self, other: Vec3) -> Vec3: ...
+    @overload
+    def __matmul__(self, other: Mat3) -> Mat3: ...
+    def __matmul__(self, other: Vec3 | Mat3) -> Vec3 | Mat3:
+        if isinstance(other, Vec3):
+            a, b, c = self.rows
+            return Vec3(a.dot(other), b.dot(other), c.dot(other))
+        m, n = self, other
+        return Mat3(
+            m.xx * n.xx + m.xy * n.yx + m.xz * n.zx,
+            m.xx * n.xy + m.xy * n.yy + m.xz * n.zy,
+            m.xx * n.xz + m.xy * n.yz + m.xz * n.zz,
+            m.yx * n.xx + m.yy * n.yx + m.yz * n.zx,
+            m.yx * n.xy + m.yy * n.yy + m.yz * n.zy,
+            m.yx * n.xz + m.yy * n.yz + m.yz * n.zz,
+            m.zx * n.xx + m.zy * n.yx + m.zz * n.zx,
+            m.zx * n.xy + m.zy * n.yy + m.zz * n.zy,
+            m.zx * n.xz + m.zy * n.yz + m.zz * n.zz,
+        )
+
+    def times(self, other: Mat3) -> Mat3:
+        """Elementwise product."""
+        return Mat3(*(a * b for a, b in zip(self, other, strict=True)))
+
+    def trace(self) -> Scalar:
+        """Sum of the diagonal."""
+        return self.xx + self.yy + self.zz
+
+    def adjugate(self) -> Mat3:
+        """Adjugate: self @ self.adjugate() = det(self) I."""
+        return Mat3(
+            self.yy * self.zz - self.yz * self.zy,
+            self.xz * self.zy - self.xy * self.zz,
+            self.xy * self.yz - self.xz * self.yy,
+            self.yz * self.zx - self.yx * self.zz,
+            self.xx * self.zz - self.xz * self.zx,
+            self.xz * self.yx - self.xx * self.yz,
+            self.yx * self.zy - self.yy * self.zx,
+            self.xy * self.zx - self.xx * self.zy,
+            self.xx * self.yy - self.xy * self.yx,
+        )
+
+    def det(self) -> Scalar:
+        """Determinant, by minors as `adjugate` has them: a compiled function computes them once."""
+        return (
+            self.xx * (self.yy * self.zz - self.yz * self.zy)
+            + self.xy * (self.yz * self.zx - self.yx * self.zz)
+            + self.xz * (self.yx * self.zy - self.yy * self.zx)
+        )
+
+    def inverse(self) -> Mat3:
+        """Inverse by the adjugate, not for near-singular matrices; not finite where the determinant is zero."""
+        inverse: Mat3 = self.adjugate() * reciprocal(self.det())
+        return inverse
+
+    def norm(self) -> Scalar:
+        """Frobenius norm."""
+        return sqrt(sum(element * element for element in self))
+
+
+class PerRotor(Value):
+    """One scalar per rotor, in the order rotor 1, 2, 3, 4; all operators work elementwise."""
+
+    __slots__ = ("r1", "r2", "r3", "r4")
+
+    def __init__(self, r1: Scalar, r2: Scalar, r3: Scalar, r4: Scalar) -> None:
+        self.r1, self.r2, self.r3, self.r4 = r1, r2, r3, r4
+
+    @classmethod
+    def all(cls, value: Scalar) -> PerRotor:
+        """The same value for each rotor."""
+        return cls(value, value, value, value)
+
+    @classmethod
+    def of(cls, values: Iterable[Scalar]) -> PerRotor:
+        """Make it of four values in an iterable."""
+        r1, r2, r3, r4 = values
+        return cls(r1, r2, r3, r4)
+
+    def _with(self, other: PerRotor | Scalar, operation: Callable[[Scalar, Scalar], Scalar]) -> PerRotor:
+        if isinstance(other, PerRotor):
+            return PerRotor(*(operation(a, b) for a, b in zip(self, other, strict=True)))
+        return PerRotor(*(operation(a, other) for a in self))
+
+    def __add__(self, other: PerRotor | Scalar) -> PerRotor:
+        return self._with(other, lambda a, b: a + b)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: PerRotor | Scalar) -> PerRotor:
+        return self._with(other, lambda a, b: a - b)
+
+    def __rsub__(self, other: Scalar) -> PerRotor:
+        return self._with(other, lambda a, b: b - a)
+
+    def __neg__(self) -> PerRotor:
+        return PerRotor(-self.r1, -self.r2, -self.r3, -self.r4)
+
+    def __mul__(self, other: PerRotor | Scalar) -> PerRotor:
+        return self._with(other, lambda a, b: a * b)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: PerRotor | Scalar) -> PerRotor:
+        return self._with(other, lambda a, b: a / b)
+
+    def map(self, function: Callable[..., Scalar], *others: PerRotor) -> PerRotor:
+        """Apply ``function(own, *others)`` rotor by rotor."""
+        return PerRotor(*(function(*values) for values in zip(self, *others, strict=True)))
+
+    def dot(self, other: PerRotor) -> Scalar:
+        """Sum over the rotors of the products."""
+        return self.r1 * other.r1 + self.r2 * other.r2 + self.r3 * other.r3 + self.r4 * other.r4
+
+    def sum(self) -> Scalar:
+        """Sum over the rotors."""
+        return self.r1 + self.r2 + self.r3 + self.r4
+
+    def reduce(self, function: Callable[[Scalar, Scalar], Scalar]) -> Scalar:
+        """Fold the four values with a function of two, such as `rotorfault.maths.scalar.minimum`."""
+        return function(function(self.r1, self.r2), function(self.r3, self.r4))
+
+
+class Quat(Value):
+    """A Hamilton quaternion (w, x, y, z); as an attitude q_WB it rotates body coordinates into the world."""
+
+    __slots__ = ("w", "x", "y", "z")
+
+    def __init__(self, w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> None:
+        self.w, self.x, self.y, self.z = w, x, y, z
+
+    @classmethod
+    def identity(cls) -> Quat:
+        """The zero rotation."""
+        return cls(1.0, 0.0, 0.0, 0.0)
+
+    @classmethod
+    def from_euler(cls, euler: Vec3) -> Quat:
+        """Quaternion of Euler angles (roll, pitch, yaw) in rad."""
+        half = euler * 0.5
+        cr, cp, cy = half.map(cos)
+        sr, sp, sy = half.map(sin)
+        return cls(
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        )
+
+    def __add__(self, other: Quat) -> Quat:
+        return Quat(self.w + other.w, self.x + other.x, self.y + other.y, self.z + other.z)
+
+    def __mul__(self, factor: Scalar) -> Quat:
+        return Quat(self.w * factor, self.x * factor, self.y * factor, self.z * factor)
+
+    __rmul__ = __mul__
+
+    def __matmul__(self, other: Quat) -> Quat:
+        """Hamilton product: first `other`, then `self`."""
+        a, b = self, other
+        return Quat(
+            a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
+            a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+            a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+            a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
+        )
+
+    def conjugate(self) -> Quat:
+        """The inverse rotation, for a unit quaternion."""
+        return Quat(self.w, -self.x, -self.y, -self.z)
+
+    def dot(self, other: Quat) -> Scalar:
+        """Scalar product of the four components."""
+        return self.w * other.w + self.x * other.x + self.y * other.y + self.z * other.z
+
+    def normalised(self) -> Quat:
+        """The unit quaternion along this one."""
+        unit: Quat = self * (1.0 / sqrt(self.dot(self)))
+        return unit
+
+    def derivative(self, omega_B: Vec3) -> Quat:
+        """Time derivative q_dot = q (0, omega_B) / 2 for body rates in rad/s."""
+        return (self @ Quat(0.0, omega_B.x, omega_B.y, omega_B.z)) * 0.5
+
+    def matrix(self) -> Mat3:
+        """Rotation matrix R_WB of a unit quaternion."""
+        w, x, y, z = self.w, self.x, self.y, self.z
+        return Mat3(
+            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+            2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        )  # fmt: skip
+
+    def euler(self) -> Vec3:
+        """Euler angles (roll, pitch, yaw) in rad; pitch in [-pi/2, pi/2], where it is singular at the ends."""
+        R = self.matrix()
+        return Vec3(atan2(R.zy, R.zz), atan2(-R.zx, sqrt(R.xx * R.xx + R.yx * R.yx)), atan2(R.yx, R.xx))
+
+
+def euler_matrix(euler: Vec3) -> Mat3:
+    """Rotation matrix R_WB = Rz(yaw) Ry(pitch) Rx(roll) of Euler angles in rad."""
+    c_roll, c_pitch, c_yaw = euler.map(cos)
+    s_roll, s_pitch, s_yaw = euler.map(sin)
+    return Mat3(
+        c_yaw * c_pitch, c_yaw * s_pitch * s_roll - s_yaw * c_roll, c_yaw * s_pitch * c_roll + s_yaw * s_roll,
+        s_yaw * c_pitch, s_yaw * s_pitch * s_roll + c_yaw * c_roll, s_yaw * s_pitch * c_roll - c_yaw * s_roll,
+        -s_pitch, c_pitch * s_roll, c_pitch * c_roll,
+    )  # fmt: skip
+
+
+def body_z_axis(euler: Vec3) -> Vec3:
+    """The thrust axis R_WB e_z in world coordinates: the third column of `euler_matrix`, as in (3)."""
+    c_roll, c_pitch, c_yaw = euler.map(cos)
+    s_roll, s_pitch, s_yaw = euler.map(sin)
+    return Vec3(
+        c_roll * s_pitch * c_yaw + s_roll * s_yaw,
+        c_roll * s_pitch * s_yaw - s_roll * c_yaw,
+        c_roll * c_pitch,
+    )
+
+
+def zeros() -> Vec3:
+    """The zero vector."""
+    return Vec3(0.0, 0.0, 0.0)

@@ -1,0 +1,94 @@
+"""Records of scalars: flatten to rows of an array, and back.
+
+A *record* is a NamedTuple whose fields are scalars, value types (`rotorfault.maths.geometry`) or records. What flows
+through the closed loop (state, memory, inputs, parameters, signals) is made of records, so that one generic
+function turns any of it into rows of an array for the batch engines, and names every row.
+
+A NamedTuple's ``+`` concatenates: records carry data, value types carry algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+from rotorfault.maths.geometry import Value
+from rotorfault.maths.scalar import Scalar, select
+
+R = TypeVar("R")
+
+
+def _parts(record: Any) -> Iterator[tuple[str, Any]] | None:
+    """Name and value of each direct part, or None for a leaf."""
+    if isinstance(record, Value):
+        return ((name, getattr(record, name)) for name in record.__slots__)
+    if isinstance(record, tuple):
+        names = getattr(record, "_fields", None) or (str(i) for i in range(len(record)))
+        return zip(names, record, strict=True)
+    return None
+
+
+def flatten(record: Any) -> list[Scalar]:
+    """All scalars of a record, depth first, in the order of the fields.
+
+    Parameters
+    ----------
+    record : scalar, value type, NamedTuple or tuple of these
+
+    Returns
+    -------
+    list of scalars
+    """
+    parts = _parts(record)
+    if parts is None:
+        return [record]
+    return [leaf for _, part in parts for leaf in flatten(part)]
+
+
+def leaf_names(record: Any, prefix: str = "") -> list[str]:
+    """Dotted name of each scalar that `flatten` returns, such as ``body.p_W.x``."""
+    parts = _parts(record)
+    if parts is None:
+        return [prefix]
+    return [leaf for name, part in parts for leaf in leaf_names(part, f"{prefix}.{name}" if prefix else name)]
+
+
+def unflatten(template: R, leaves: Iterator[Scalar] | list[Scalar]) -> R:
+    """Rebuild a record like `template` from scalars in the order of `flatten`.
+
+    Parameters
+    ----------
+    template : record
+        Gives the shape; its own numbers are ignored.
+    leaves : iterator or list of scalars
+
+    Raises
+    ------
+    ValueError
+        If there are fewer leaves than the template has.
+    """
+    source = iter(leaves)
+
+    def build(part: Any) -> Any:
+        parts = _parts(part)
+        if parts is None:
+            try:
+                return next(source)
+            except StopIteration:
+                raise ValueError("fewer scalars than the record has fields") from None
+        values = [build(inner) for _, inner in parts]
+        if isinstance(part, Value) or hasattr(part, "_fields"):
+            return type(part)(*values)
+        return tuple(values)
+
+    return build(template)  # type: ignore[no-any-return]
+
+
+def select_record(condition: Scalar, a: R, b: R) -> R:
+    """`rotorfault.maths.scalar.select` on every scalar of two records of the same shape."""
+    from_b = iter(flatten(b))
+    return unflatten(a, [_select(condition, leaf, next(from_b)) for leaf in flatten(a)])
+
+
+def _select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
+    return a if a is b else select(condition, a, b)

@@ -1,0 +1,71 @@
+"""The effectiveness matrix of a quadrotor with two opposite pairs of rotors, and its inverse in closed form.
+
+Rotors 1 and 2 are opposite each other about the centre of mass (r2 = -r1), so are rotors 3 and 4 (r4 = -r3); both
+rotors of a pair push the same way in yaw (sign s for the first pair, -s for the second). This covers "+", "X" and
+stretched X. With the sums S12 = F1 + F2, S34 = F3 + F4 and the differences D12 = F1 - F2, D34 = F3 - F4, the
+effectiveness matrix of `rotorfault.model.vehicle.wrench_of`, equation (4) of the paper, falls apart:
+
+    thrust    = S12 + S34                 tau_roll  =  y1 D12 + y3 D34
+    tau_yaw   = s kappa (S12 - S34)       tau_pitch = -x1 D12 - x3 D34
+
+so tilt torque is a matter of the differences alone, thrust and yaw of the sums alone. (36) in the paper is the
+inverse for its "+" vehicle, with (4)'s numbering: D12 = -tau_pitch / l, D34 = -tau_roll / l. The differences are
+the tilt torque in *arm axes*, about the normals of the two arms, in newton.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import Wrench
+from rotorfault.model.vehicle import Vehicle
+
+
+class PairDemand(NamedTuple):
+    """A wrench in terms of the rotor pairs: it fixes all four rotor thrusts, and splits tilt from thrust and yaw."""
+
+    S12: Scalar  # N, F1 + F2
+    S34: Scalar  # N, F3 + F4
+    D12: Scalar  # N, F1 - F2
+    D34: Scalar  # N, F3 - F4
+
+
+def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
+    """Pair sums and differences that give a wrench, whatever its size; linear in the wrench.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Two opposite pairs of rotors, arms not parallel, torque_ratio not 0.
+    wrench : Wrench
+        Thrust [N] and torque [N m, body axes].
+
+    Returns
+    -------
+    PairDemand
+        In N.
+    """
+    x1, x3 = vehicle.rotor_x.r1, vehicle.rotor_x.r3
+    y1, y3 = vehicle.rotor_y.r1, vehicle.rotor_y.r3
+    tau = wrench.torque_B
+    det = x1 * y3 - x3 * y1
+    yaw = tau.z / (vehicle.rotor_yaw_sign.r1 * vehicle.torque_ratio)
+    return PairDemand(
+        S12=(wrench.thrust + yaw) * 0.5,
+        S34=(wrench.thrust - yaw) * 0.5,
+        D12=-(x3 * tau.x + y3 * tau.y) / det,
+        D34=(x1 * tau.x + y1 * tau.y) / det,
+    )
+
+
+def rotor_thrusts(pairs: PairDemand) -> PerRotor:
+    """Thrust of each rotor in N from the sums and differences of its pair."""
+    S12, S34, D12, D34 = pairs
+    return PerRotor(S12 + D12, S12 - D12, S34 + D34, S34 - D34) * 0.5
+
+
+def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
+    """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected."""
+    return rotor_thrusts(pair_demand(vehicle, wrench))

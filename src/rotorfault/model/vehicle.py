@@ -1,0 +1,79 @@
+"""A quadrotor's parameters, and its effectiveness: how rotor thrusts become a wrench.
+
+Rotor i sits at (x_i, y_i) in the body frame; a thrust F_i there gives the torque (y_i F_i, -x_i F_i) and the yaw
+torque s_i kappa F_i, where s_i is +1 for a rotor that pushes the body towards positive yaw. For the paper's
+geometry (rotor 1 front, 2 rear, 3 right, 4 left) this is its equation (4) with the coefficients sorted out:
+
+    thrust    = F1 + F2 + F3 + F4
+    tau_roll  = l (F4 - F3)
+    tau_pitch = l (F2 - F1)
+    tau_yaw   = kappa (F1 + F2 - F3 - F4)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, maximum, sqrt
+from rotorfault.model.signals import Wrench
+
+
+class Vehicle(NamedTuple):
+    """Numbers of one quadrotor, SI units. Truth and belief each hold their own."""
+
+    mass: Scalar  # kg
+    inertia: Vec3  # kg m^2, principal moments about body x, y, z
+    rotor_inertia: Scalar  # kg m^2, one rotor with its share of the motor, about its axis
+    rotor_x: PerRotor  # m, forward of the centre of mass
+    rotor_y: PerRotor  # m, left of the centre of mass
+    rotor_yaw_sign: PerRotor  # +1: its drag torque turns the body towards positive yaw; -1: the other way
+    thrust_coefficient: Scalar  # N/(rad/s)^2, thrust per squared rotor speed
+    torque_ratio: Scalar  # m, drag torque over thrust (kappa)
+    thrust_min: Scalar  # N per rotor
+    thrust_max: Scalar  # N per rotor
+    rotor_bandwidth: Scalar  # rad/s, first-order lag (w0)
+    rotor_gain: Scalar  # thrust per commanded thrust (k)
+    linear_drag: Scalar  # N s/m, force per speed relative to the air (k_d)
+    gravity: Scalar  # m/s^2
+
+
+def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:
+    """Wrench that rotor thrusts give: the effectiveness matrix times F, equation (4)."""
+    return Wrench(
+        thrust=thrust.sum(),
+        torque_B=Vec3(
+            thrust.dot(vehicle.rotor_y),
+            -thrust.dot(vehicle.rotor_x),
+            thrust.dot(vehicle.rotor_yaw_sign) * vehicle.torque_ratio,
+        ),
+    )
+
+
+def rotor_speeds(vehicle: Vehicle, thrust: PerRotor) -> PerRotor:
+    """Rotor speeds in rad/s at which sound rotors give these thrusts in N; 0 for negative ones."""
+    return thrust.map(lambda f: sqrt(maximum(f, 0.0) / vehicle.thrust_coefficient))
+
+
+def residual_speed(vehicle: Vehicle, speeds: PerRotor) -> Scalar:
+    """Overall residual rotor speed Omega of (4) in rad/s, the sum of signed speeds.
+
+    A rotor that pushes the body towards positive yaw turns the other way itself, hence the minus:
+    Omega = -Omega1 - Omega2 + Omega3 + Omega4 on the paper's vehicle.
+    """
+    return -speeds.dot(vehicle.rotor_yaw_sign)
+
+
+def gyroscopic_torque(vehicle: Vehicle, omega_B: Vec3, residual: Scalar) -> Vec3:
+    """Torque on the body from turning the rotors' angular momentum, in N m about the body axes.
+
+    - omega x (J_r Omega e_z) = J_r Omega (-q, p, 0): it does no work (omega . tau = 0), which settles the sign of
+    the pitch row that (3) prints wrongly.
+    """
+    momentum = vehicle.rotor_inertia * residual
+    return Vec3(-omega_B.y * momentum, omega_B.x * momentum, 0.0)
+
+
+def hover_thrust(vehicle: Vehicle) -> PerRotor:
+    """Thrust per rotor in level hover with sound rotors, in N, for rotors at equal distance on opposite arms."""
+    return PerRotor.all(vehicle.mass * vehicle.gravity / 4.0)

@@ -1,0 +1,248 @@
+"""Vehicle files: TOML in which every number carries its unit and its source.
+
+    name = "paper"
+    description = "one line"
+    mass = { value = 1.77, unit = "kg", source = "paper, section 5" }
+    ...
+    [[rotor]]                    # four of them; 1 and 2 are opposite, and so are 3 and 4
+    name = "front"               # optional: the vendor's name
+    x = { value = 0.42, unit = "m", source = "paper, (3)" }    # forward of the centre of mass
+    y = { value = 0.0, unit = "m", source = "..." }            # left of it
+    yaw = "+"                    # its drag torque turns the body towards positive yaw (to the left)
+
+Units are the SI units of `rotorfault.model.vehicle.Vehicle` and nothing else, so that no number is converted silently.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
+from rotorfault.base.errors import InputError
+from rotorfault.base.registry import unknown
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.vehicle import Vehicle
+
+BALANCE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
+
+
+class Quantity(Strict):
+    """A number with its unit and where it comes from."""
+
+    value: Annotated[float, Field(strict=True, description="the number, in `unit`")]
+    unit: str = Field(description="SI unit")
+    source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
+
+
+def _in(unit: str, rule: Callable[[float], bool] | None = None, allowed: str = "") -> AfterValidator:
+    """Check that a quantity comes in this unit and its value within the allowed range."""
+
+    def check(quantity: Quantity) -> Quantity:
+        if quantity.unit != unit:
+            raise refusal("unit", f"got '{quantity.unit}'; allowed: '{unit}'; convert the value to it")
+        if rule is not None and not rule(quantity.value):
+            raise refusal("value", f"got {quantity.value!r} {unit}; allowed: {allowed}")
+        return quantity
+
+    return AfterValidator(check)
+
+
+def _positive(unit: str) -> AfterValidator:
+    return _in(unit, lambda value: value > 0.0, "greater than 0")
+
+
+def _not_negative(unit: str) -> AfterValidator:
+    return _in(unit, lambda value: value >= 0.0, "0 or greater")
+
+
+Inertia = Annotated[Quantity, _positive("kg m^2")]
+Length = Annotated[Quantity, _in("m")]
+Thrust = Annotated[Quantity, _not_negative("N")]
+
+
+class Rotor(Strict):
+    """Where one rotor sits and which way its drag torque turns the body."""
+
+    x: Length = Field(description="forward of the centre of mass, m")
+    y: Length = Field(description="left of the centre of mass, m")
+    yaw: Literal["+", "-"] = Field(description="'+' if its drag torque turns the body towards positive yaw")
+    name: str = Field(default="", description="the vendor's name of the rotor")
+
+
+class VehicleFile(Strict):
+    """What a vehicle file says, checked; `vehicle` gives the plain numbers."""
+
+    name: str = Field(min_length=1, description="short name, as used in scenarios")
+    description: str = Field(default="", description="one line")
+    mass: Annotated[Quantity, _positive("kg")] = Field(description="kg, with battery")
+    inertia_x: Inertia = Field(description="kg m^2, principal moment about the forward axis")
+    inertia_y: Inertia = Field(description="kg m^2, principal moment about the left axis")
+    inertia_z: Inertia = Field(description="kg m^2, principal moment about the upward axis")
+    rotor_inertia: Annotated[Quantity, _not_negative("kg m^2")] = Field(description="kg m^2, one rotor on its axis")
+    thrust_coefficient: Annotated[Quantity, _positive("N/(rad/s)^2")] = Field(
+        description="N/(rad/s)^2, thrust per squared rotor speed"
+    )
+    torque_ratio: Annotated[Quantity, _positive("m")] = Field(description="m, drag torque over thrust (kappa)")
+    thrust_min: Thrust = Field(description="N, least thrust of a rotor")
+    thrust_max: Thrust = Field(description="N, greatest thrust of a rotor")
+    rotor_bandwidth: Annotated[Quantity, _positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
+    rotor_gain: Annotated[Quantity, _positive("1")] = Field(description="thrust per commanded thrust (k)")
+    linear_drag: Annotated[Quantity, _not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
+    gravity: Annotated[Quantity, _positive("m/s^2")] = Field(description="m/s^2")
+    rotor: tuple[Rotor, ...] = Field(description="four rotors; 1 and 2 opposite, 3 and 4 opposite")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> VehicleFile:
+        for check in (self._check_inertia, self._check_thrust, self._check_pairs, self._check_rank):
+            error = check()
+            if error is not None:
+                raise error
+        return self
+
+    def _check_inertia(self) -> PydanticCustomError | None:
+        moments = {"x": self.inertia_x.value, "y": self.inertia_y.value, "z": self.inertia_z.value}
+        for axis, moment in moments.items():
+            others = math.fsum(moments.values()) - moment
+            # Equality is a flat plate; rounding of printed digits must not refuse it.
+            if moment > others * (1.0 + 1e-9):
+                message = f"got {moment!r} kg m^2; allowed: at most the sum of the other two, {others:.6g} (no rigid"
+                return refusal(f"inertia_{axis}", f"{message} body has more); check the exponents")
+        return None
+
+    def _check_thrust(self) -> PydanticCustomError | None:
+        low, high = self.thrust_min.value, self.thrust_max.value
+        if not low < high:
+            return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
+        ratio = self.thrust_to_weight
+        hover = self.mass.value * self.gravity.value / (4.0 * self.rotor_gain.value)
+        if not ratio > 1.0:
+            message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"
+            return refusal("thrust_max", f"{message} {hover:.4g} N per rotor")
+        if not low < hover:
+            return refusal(
+                "thrust_min",
+                f"got {low!r} N: it cannot descend; allowed: less than in hover, {hover:.4g} N per rotor",
+            )
+        return None
+
+    def _check_pairs(self) -> PydanticCustomError | None:
+        if len(self.rotor) != 4:
+            return refusal("rotor", f"got {len(self.rotor)} tables; allowed: four [[rotor]] tables")
+        for first, second in ((0, 1), (2, 3)):
+            a, b = self.rotor[first], self.rotor[second]
+            for axis, off in (("x", a.x.value + b.x.value), ("y", a.y.value + b.y.value)):
+                if not abs(off) <= BALANCE_TOLERANCE:
+                    message = f"rotors {first + 1} and {second + 1} must be opposite about the centre of mass: their"
+                    return refusal(f"rotor.{second}.{axis}", f"{message} {axis} sum to {off:.6g} m; allowed: 0")
+            if a.yaw != b.yaw:
+                message = f"got '{b.yaw}'; allowed: '{a.yaw}', as rotors {first + 1} and {second + 1} are a pair"
+                return refusal(f"rotor.{second}.yaw", message)
+        if self.rotor[0].yaw == self.rotor[2].yaw:
+            message = f"got '{self.rotor[2].yaw}' for both pairs; allowed: one for rotors 1, 2, the other for 3, 4"
+            return refusal("rotor.2.yaw", message)
+        return None
+
+    def _check_rank(self) -> PydanticCustomError | None:
+        # The yaw row is scaled by any length; only the rank counts.
+        x = np.array([rotor.x.value for rotor in self.rotor])
+        y = np.array([rotor.y.value for rotor in self.rotor])
+        arm = float(np.hypot(x, y).max())
+        sign = np.array([_sign(rotor) for rotor in self.rotor])
+        rows = np.array([np.ones(4), y / max(arm, 1e-300), x / max(arm, 1e-300), sign])
+        if np.linalg.svd(rows, compute_uv=False)[-1] < 1e-6:
+            message = "the four rotors cannot give thrust, roll, pitch and yaw independently; allowed: two pairs on"
+            return refusal("rotor", f"{message} different lines through the centre of mass")
+        return None
+
+    @property
+    def thrust_to_weight(self) -> float:
+        """Greatest thrust of all rotors over the weight."""
+        return 4.0 * self.rotor_gain.value * self.thrust_max.value / (self.mass.value * self.gravity.value)
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The numbers alone, as Python floats in SI units."""
+        return Vehicle(
+            mass=self.mass.value,
+            inertia=Vec3(self.inertia_x.value, self.inertia_y.value, self.inertia_z.value),
+            rotor_inertia=self.rotor_inertia.value,
+            rotor_x=PerRotor.of(rotor.x.value for rotor in self.rotor),
+            rotor_y=PerRotor.of(rotor.y.value for rotor in self.rotor),
+            rotor_yaw_sign=PerRotor.of(_sign(rotor) for rotor in self.rotor),
+            thrust_coefficient=self.thrust_coefficient.value,
+            torque_ratio=self.torque_ratio.value,
+            thrust_min=self.thrust_min.value,
+            thrust_max=self.thrust_max.value,
+            rotor_bandwidth=self.rotor_bandwidth.value,
+            rotor_gain=self.rotor_gain.value,
+            linear_drag=self.linear_drag.value,
+            gravity=self.gravity.value,
+        )
+
+    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every number of the file under its key, such as ``mass`` or ``rotor.1.x``, with unit and source."""
+        for key in type(self).model_fields:
+            if isinstance(quantity := getattr(self, key), Quantity):
+                yield key, quantity
+        for number, rotor in enumerate(self.rotor, start=1):
+            yield f"rotor.{number}.x", rotor.x
+            yield f"rotor.{number}.y", rotor.y
+
+
+def _sign(rotor: Rotor) -> float:
+    return 1.0 if rotor.yaw == "+" else -1.0
+
+
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that come with rotorfault."""
+    folder = resources.files("rotorfault.model.vehicles")
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_vehicle(name_or_path: str | Path) -> VehicleFile:
+    """Load and check a vehicle.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a built-in vehicle, or a path that ends in ``.toml``.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle or file, or it is not right; one line with file and key.
+    """
+    if str(name_or_path).endswith(".toml"):
+        where, text = str(name_or_path), read_text(name_or_path)
+    else:
+        name = str(name_or_path)
+        if name not in vehicle_names():
+            raise InputError(f"{unknown('vehicle', name, vehicle_names())}; or give a path that ends in .toml")
+        where = f"{name}.toml"
+        text = (resources.files("rotorfault.model.vehicles") / where).read_text(encoding="utf-8")
+    return validate(VehicleFile, parse_toml(text, where), where)
+
+
+def new_vehicle(name: str) -> str:
+    """Text of a vehicle file to start from: commented, and valid as it stands.
+
+    Raises
+    ------
+    InputError
+        If the name is empty or contains quotation marks, backslashes or line breaks.
+    """
+    if not name or any(character in '"\\' or not character.isprintable() for character in name):
+        raise InputError(f"vehicle name {name!r}; allowed: printable characters without quotation marks or backslash")
+    return VEHICLE_TEMPLATE.replace("NAME", name, 1)
+
+
+VEHICLE_TEMPLATE = (resources.files("rotorfault.model.vehicles") / "template.txt").read_text(encoding="utf-8")
+"""A commented vehicle file with NAME for its name."""

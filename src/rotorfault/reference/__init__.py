@@ -1,0 +1,1 @@
+"""Where the vehicle should be, as functions of time."""

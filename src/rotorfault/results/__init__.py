@@ -1,0 +1,1 @@
+"""What came of a flight: its records, its numbers, its files."""

@@ -1,0 +1,1 @@
+"""A flight as data: everything that defines it, checked once."""

@@ -1,0 +1,72 @@
+"""Neighbours of a scenario: the same task with a vehicle, start and faults that are a little different.
+
+They answer whether a flight is an accident of its numbers. What varies is unknown to the autopilot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorfault.base.errors import InputError
+from rotorfault.scenario.scenario import Mismatch, Part, Scenario, Start
+
+
+def neighbour(
+    scenario: Scenario, seed: int, spread: float = 0.1, onset: tuple[float, float] = (0.5, 5.0)
+) -> Scenario:
+    """A seeded neighbour.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+        0 or greater. Names the draw; the same seed gives the same neighbour.
+    spread : float
+        Between 0 and 1, both excluded. True mass, principal moments of inertia and drag, and each initial
+        position, attitude and rate, are multiplied by factors uniform in 1 -+ spread, independently.
+    onset : (2,) float
+        All faults that set in at a time are moved to a common one, uniform in this interval [s].
+
+    Returns
+    -------
+    Scenario
+        Same parts, same length: it may fly in one batch with the original.
+
+    Raises
+    ------
+    InputError
+        If `seed` or `spread` is out of its range.
+    """
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed: got {seed!r}; allowed: a whole number, 0 or greater")
+    if not 0.0 < spread < 1.0:
+        raise InputError(f"spread: got {spread!r}; allowed: between 0 and 1, both excluded")
+    # The second word keeps this stream apart from the sensor noise of the same seed.
+    draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 1 << 40])))
+
+    def factors(count: int) -> list[float]:
+        return [float(x) for x in draw.uniform(1.0 - spread, 1.0 + spread, count)]
+
+    def scaled(values: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (value * factor for value, factor in zip(values, factors(3), strict=True))
+        return x, y, z
+
+    mass, *inertia, drag = factors(5)
+    # A body whose largest moment exceeds the sum of the others does not exist; the paper's is far from it.
+    mismatch = Mismatch(mass=mass, inertia=(inertia[0], inertia[1], inertia[2]), linear_drag=drag)
+    start = Start(
+        position=scaled(scenario.start.position),
+        velocity=scaled(scenario.start.velocity),
+        attitude=scaled(scenario.start.attitude),
+        body_rates=scaled(scenario.start.body_rates),
+    )
+    moment = float(draw.uniform(*onset))
+    # On a sampling instant, as the original's: between two of them it would act from the next sub-step on.
+    moment = round(moment / scenario.period) * scenario.period
+    faults = tuple(
+        Part(part.registry, part.kind, part.settings.model_copy(update={"time": moment}))
+        if "time" in type(part.settings).model_fields
+        else part
+        for part in scenario.fault
+    )
+    return scenario.model_copy(update={"mismatch": mismatch, "start": start, "fault": faults})

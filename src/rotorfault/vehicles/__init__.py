@@ -1,1 +1,0 @@
-"""Vehicles that come with rotorfault, one TOML file each, and a template; see `rotorfault.vehicle_file`."""
