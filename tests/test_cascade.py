@@ -23,7 +23,8 @@ from rotorfault.autopilot.control.cascade import (
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble, assemble_all
-from rotorfault.maths.geometry import Vec3, body_z_axis, zeros
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.rotation import body_z_axis
 from rotorfault.model.signals import Measurement, Reference
 from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.scenario.scenario import Scenario, scenario_from

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.maths.geometry import Mat3, PerRotor, Quat, Vec3, body_z_axis, euler_matrix, zeros
+from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
+from rotorfault.maths.rotation import Quat, body_z_axis, euler_matrix
 
 component = st.floats(-100.0, 100.0)
 vectors = st.builds(Vec3, component, component, component)

@@ -30,7 +30,8 @@ from rotorfault.autopilot.control.sdre import (
 from rotorfault.autopilot.control.smc import MATCH_AT, Smc
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
-from rotorfault.maths.geometry import Mat3, Vec3, body_z_axis, zeros
+from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.maths.rotation import body_z_axis
 from rotorfault.model.signals import Measurement, Reference
 from rotorfault.model.vehicle import gyroscopic_torque
 from rotorfault.plant.models import acceleration, angular_acceleration

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.flight.flight import Flight, fly, fly_all, load, repeat
     from rotorfault.flight.many import Flights, fly_many
-    from rotorfault.maths.geometry import Mat3, PerRotor, Quat, Vec3
+    from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
+    from rotorfault.maths.rotation import Quat
     from rotorfault.model.signals import Measurement, Reference, Wrench
     from rotorfault.model.vehicle import Vehicle
     from rotorfault.model.vehicle_file import load_vehicle, vehicle_names

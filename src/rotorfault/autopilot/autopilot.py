@@ -1,195 +1,177 @@
-"""The autopilot: diagnosis, response to a fault, control, allocation, once per sampling period.
+"""The autopilot: its parts in the order of their slots, once per sampling period.
 
-It sees measurements and the scenario's reference, and holds beliefs: about its vehicle, about what its rotors do
-with the commands it sent, about faults. It never sees the plant.
+It sees readings and the scenario's reference, and holds beliefs: about its vehicle, about what its rotors do with the
+commands it sent, about faults. It never sees the plant. What flows where is said by the slots
+(`rotorfault.autopilot.instant`); here stand their order, the memory that they share, and the command that is sent.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple, final
 
-from rotorfault.autopilot.allocation.available import thrust_available
-from rotorfault.autopilot.allocation.protocol import Allocator
-from rotorfault.autopilot.control.landing import Continue, Response, ResponseInputs
-from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlTelemetry, Prediction
-from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
-from rotorfault.autopilot.diagnosis.rotor_model import RotorModel, expected_thrust, follow, rotors_at_hover
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.autopilot.allocation.accounting import account, direct
+from rotorfault.autopilot.control.protocol import ControlOutput
+from rotorfault.autopilot.diagnosis.protocol import Oracle
+from rotorfault.autopilot.instant import Decision, Instant, Past
+from rotorfault.autopilot.rotor_model import follow, rotors_at_hover
+from rotorfault.maths.geometry import PerRotor, zeros
+from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Allocation, Command, Diagnosis, Measurement, Motion, Reference, Wrench, motion_of
-from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
+from rotorfault.model.block import Block, Record
+from rotorfault.model.signals import Allocation, Command, Readings, Reference, Wrench, healthy, motion_of
+from rotorfault.model.slot import Slot
+from rotorfault.model.telemetry import example
+from rotorfault.model.vehicle import Vehicle, hover_thrust
 
-
-class AutopilotParameters(NamedTuple):
-    """All numbers of the autopilot; `vehicle` is its belief."""
-
-    vehicle: Vehicle
-    diagnosis: Any
-    response: Any
-    control: Any
+AnyBlock = Block[Any, Any, Any, Any]
 
 
 class AutopilotMemory(NamedTuple):
     """All that the autopilot carries from one sampling instant to the next."""
 
-    rotors: RotorModel
-    previous: Motion
-    direct_acceleration_W: Vec3  # m/s^2: commanded last, zero without the option `six_inputs`
-    elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
-    diagnosis: Any
-    response: Any
-    control: Any
+    past: Past
+    parts: Any  # record of the parts' memories, by slot
 
 
 class AutopilotReport(NamedTuple):
     """What one sampling instant decided, for the record."""
 
-    diagnosis: Diagnosis
-    expected_thrust: PerRotor  # N: thrust of sound rotors
+    instant: Instant  # with the output of every part
     wrench: Wrench  # demanded
-    allocation: Allocation
-    control: ControlTelemetry
-    reference: Reference  # that was flown
-    stage: Scalar  # of the response: 0 as the scenario wants, 1 descending, 2 rotors stopped
+    allocation: Allocation  # of the command that is sent
+    telemetry: dict[str, Record]  # signals of each part, by slot
 
 
 @final
 class Autopilot:
-    """Diagnosis, response to a fault, control and allocation put together.
+    """The parts of an autopilot put together.
 
     Parameters
     ----------
-    diagnoser : Diagnoser
-    controller : Controller
-    allocator : Allocator
-    response : Response, optional
-        What it does about a confirmed fault; flies on if not given.
+    parts : mapping of Slot to Block
+        In the order in which they act: estimator, diagnosis, response, controller, allocation, and whatever else has a
+        slot.
     """
 
-    def __init__(
-        self, diagnoser: Diagnoser, controller: Controller, allocator: Allocator, response: Response | None = None
-    ) -> None:
-        self.diagnoser, self.controller, self.allocator = diagnoser, controller, allocator
-        self.response: Response = Continue() if response is None else response
+    def __init__(self, parts: Mapping[Slot[Any], AnyBlock]) -> None:
+        self.parts = dict(parts)
+        self._record = record_type("AutopilotParts", tuple(slot.name for slot in self.parts))
 
-    def parameters(self, vehicle: Vehicle, period: float) -> AutopilotParameters:
-        """Numbers for a believed vehicle and a sampling period in s."""
-        return AutopilotParameters(
-            vehicle,
-            self.diagnoser.parameters(vehicle, period),
-            self.response.parameters(),
-            self.controller.parameters(vehicle, period),
-        )
+    @property
+    def oracle(self) -> Oracle[Any, Any] | None:
+        """The source of diagnosis, if it is one that is told the truth."""
+        diagnoser = next((part for slot, part in self.parts.items() if slot.name == "diagnosis"), None)
+        return diagnoser if isinstance(diagnoser, Oracle) else None
 
     def initial(
-        self, measurement: Measurement, reference: Reference, parameters: AutopilotParameters
+        self, readings: Readings, reference: Reference, vehicle: Vehicle, parameters: Any, dt: Scalar
     ) -> AutopilotMemory:
-        """Memory before the first step; the rotors are believed at hover thrust."""
-        return AutopilotMemory(
-            rotors=rotors_at_hover(parameters.vehicle),
-            previous=motion_of(measurement),
-            direct_acceleration_W=zeros(),
-            elapsed=0.0,
-            diagnosis=self.diagnoser.initial(measurement, parameters.diagnosis),
-            response=self.response.initial(measurement),
-            control=self.controller.initial(measurement, reference, parameters.control),
-        )
+        """Memory before the first step; the rotors are believed at hover thrust.
+
+        Parameters
+        ----------
+        readings : Readings
+            Of the first sampling instant.
+        reference : Reference
+            The scenario's, at the first sampling instant.
+        vehicle : Vehicle
+            As believed.
+        parameters : record
+            Numbers of the parts, by slot.
+        dt : scalar, s
+            Sampling period.
+        """
+        hover = hover_thrust(vehicle)
+        past = Past(rotors_at_hover(vehicle), (), Command(hover, zeros()), 0.0)
+        instant = Instant(readings, reference, vehicle, past, dt)
+        # What the parts would say before anything is known: hover with sound rotors.
+        wrench = Wrench(hover.sum(), zeros())
+        instant.outputs = {
+            "diagnosis": healthy(),
+            "on_fault": Decision(reference, healthy()),
+            "controller": ControlOutput(wrench),
+            "allocation": account(vehicle, wrench, healthy(), hover / vehicle.rotor_gain),
+        }
+        memories = []
+        for slot, part in self.parts.items():
+            numbers = getattr(parameters, slot.name)
+            inputs = _inputs(slot, instant)
+            memories.append(part.initial(inputs, numbers))
+            if slot.name == "estimator":
+                instant.outputs[slot.name] = part.step(memories[-1], inputs, numbers, dt)[1]
+        past = past._replace(previous=motion_of(instant.estimate))
+        return AutopilotMemory(past, self._record(*memories))
 
     def step(
         self,
         memory: AutopilotMemory,
-        measurement: Measurement,
+        readings: Readings,
         reference: Reference,
-        true_loss: PerRotor,
-        parameters: AutopilotParameters,
+        vehicle: Vehicle,
+        parameters: Any,
         dt: Scalar,
+        true_loss: PerRotor | None = None,
     ) -> tuple[AutopilotMemory, Command, AutopilotReport]:
         """One sampling instant.
 
         Parameters
         ----------
-        true_loss : PerRotor
-            For the diagnosis sources `oracle` and `delayed`; zero, and unread, with any other.
+        memory : AutopilotMemory
+        readings : Readings
+        reference : Reference
+            The scenario's.
+        vehicle : Vehicle
+            As believed.
+        parameters : record
+            Numbers of the parts, by slot.
         dt : scalar, s
-            The sampling period.
+            Sampling period.
+        true_loss : PerRotor, optional
+            For a source of diagnosis that is an oracle, and for nobody else.
         """
-        vehicle, now = parameters.vehicle, motion_of(measurement)
-        thrust_now = expected_thrust(memory.rotors, vehicle)
-        speed = residual_speed(vehicle, rotor_speeds(vehicle, thrust_now))
-
-        diagnosis_memory, diagnosis = self.diagnoser.step(
-            memory.diagnosis,
-            DiagnosisInputs(
-                measurement,
-                now,
-                memory.previous,
-                vehicle,
-                memory.rotors.mean,
-                thrust_now,
-                speed,
-                memory.elapsed,
-                true_loss,
-            ),
-            parameters.diagnosis,
-        )
-        diagnosis = self.response.believed(memory.response, diagnosis)
-        prediction = predict(memory, now, diagnosis, vehicle, speed)
-        response_memory, decided = self.response.step(
-            memory.response,
-            ResponseInputs(
-                measurement,
-                reference,
-                vehicle,
-                diagnosis,
-                thrust_now.dot(1.0 - diagnosis.loss),
-                measurement.v_W.z - memory.previous.v_W.z - prediction.delta_v_W.z,
-            ),
-            parameters.response,
-            dt,
-        )
-        reference = decided.reference
-        control_memory, demanded = self.controller.step(
-            memory.control,
-            ControlInputs(
-                measurement, reference, vehicle, prediction, speed, thrust_available(vehicle, diagnosis.loss)
-            ),
-            parameters.control,
-            dt,
-        )
-        allocation = self.allocator.allocate(vehicle, demanded.wrench, diagnosis)
-        thrust = self.response.relieved(allocation.command, decided, vehicle)
-
-        after = AutopilotMemory(
-            rotors=follow(memory.rotors, thrust, vehicle, dt),
-            previous=now,
-            direct_acceleration_W=demanded.direct_acceleration_W,
+        instant = Instant(readings, reference, vehicle, memory.past, dt)
+        memories, telemetry, wrench = [], {}, None
+        for slot, part in self.parts.items():
+            before, numbers = getattr(memory.parts, slot.name), getattr(parameters, slot.name)
+            if slot.name == "allocation" and isinstance(instant.demand, PerRotor):
+                # The controller commands the rotors itself.
+                wrench, output = direct(vehicle, instant.decision.diagnosis, instant.demand)
+                after, signals = before, example(part.Telemetry)
+            elif true_loss is not None and isinstance(part, Oracle):
+                output = part.told(true_loss, _inputs(slot, instant), numbers)
+                after, signals = before, example(part.Telemetry)
+            else:
+                after, output, signals = part.step(before, _inputs(slot, instant), numbers, dt)
+            memories.append(after)
+            instant.outputs[slot.name] = output
+            telemetry[slot.name] = signals
+        if wrench is None:
+            assert isinstance(instant.demand, Wrench)
+            wrench = instant.demand
+        allocation = self._relieved(instant, wrench)
+        command = Command(allocation.command, instant.outputs["controller"].direct_acceleration_W)
+        past = Past(
+            rotors=follow(memory.past.rotors, command.thrust, vehicle, dt),
+            previous=instant.expectation.now,
+            command=command,
             elapsed=dt,
-            diagnosis=diagnosis_memory,
-            response=response_memory,
-            control=control_memory,
         )
-        command = Command(thrust, demanded.direct_acceleration_W)
-        report = AutopilotReport(
-            diagnosis, thrust_now, demanded.wrench, allocation, demanded.telemetry, reference, decided.stage
-        )
-        return after, command, report
+        report = AutopilotReport(instant, wrench, allocation, telemetry)
+        return AutopilotMemory(past, self._record(*memories)), command, report
+
+    @staticmethod
+    def _relieved(instant: Instant, wrench: Wrench) -> Allocation:
+        """The allocation, less what the response takes back of every thrust."""
+        allocation, decision = instant.allocation, instant.decision
+        relief = decision.relief
+        if isinstance(relief, tuple):
+            return allocation
+        least = instant.vehicle.thrust_min
+        command = allocation.command.map(lambda f: least + (f - least) * (1.0 - relief))
+        return account(instant.vehicle, wrench, decision.diagnosis, command)
 
 
-def predict(
-    memory: AutopilotMemory, now: Motion, diagnosis: Diagnosis, vehicle: Vehicle, speed: Scalar
-) -> Prediction:
-    """Velocity changes over the last period that the believed rotors, gravity, drag and gyroscopics explain."""
-    before, dt = memory.previous, memory.elapsed
-    wrench = wrench_of(vehicle, memory.rotors.mean * (1.0 - diagnosis.loss))
-    axis_W = (before.axis_W + now.axis_W) * 0.5
-    v_W = (before.v_W + now.v_W) * 0.5
-    omega_B = (before.omega_B + now.omega_B) * 0.5
-    J = vehicle.inertia
-    acceleration_W = (
-        axis_W * (wrench.thrust / vehicle.mass)
-        - Vec3(0.0, 0.0, vehicle.gravity)
-        - v_W * (vehicle.linear_drag / vehicle.mass)
-        + memory.direct_acceleration_W
-    )
-    torque_B = wrench.torque_B + gyroscopic_torque(vehicle, omega_B, speed) - omega_B.cross(J.times(omega_B))
-    return Prediction(acceleration_W * dt, torque_B.over(J) * dt)
+def _inputs(slot: Slot[Any], instant: Instant) -> Any:
+    assert slot.inputs is not None, f"slot {slot.name} does not say what its parts get"
+    return slot.inputs(instant)

@@ -6,7 +6,6 @@ Configuration comes from TOML files or from Python. It is checked once, at the e
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, nearest
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -31,6 +30,10 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    def code(self) -> tuple[str, ...]:
+        """Places of code from outside the package that these settings would run."""
+        return ()
+
     @model_validator(mode="before")
     @classmethod
     def _know_all_keys(cls, data: Any) -> Any:
@@ -40,9 +43,7 @@ class Strict(BaseModel):
             allowed = [name if field.alias is None else field.alias for name, field in cls.model_fields.items()]
             for key, value in data.items():
                 if key not in allowed and key not in cls.model_fields:
-                    close = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.5)
-                    hint = f"; did you mean '{close[0]}'?" if close else ""
-                    raise refusal(str(key), f"unknown key{hint} (allowed: {', '.join(allowed)})")
+                    raise refusal(str(key), f"unknown key{nearest(key, allowed)} (allowed: {', '.join(allowed)})")
                 # pydantic would take true for 1.
                 if isinstance(value, bool) and cls.model_fields[key].annotation in (float, int, float | None):
                     raise refusal(str(key), f"got {str(value).lower()}; allowed: a number")
@@ -115,7 +116,7 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def validate(model: type[M], data: Any, where: str) -> M:
+def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | None = None) -> M:
     """Check configuration data against a model.
 
     Parameters
@@ -125,6 +126,8 @@ def validate(model: type[M], data: Any, where: str) -> M:
         As `read_toml` returns it.
     where : str
         The file, for messages.
+    context : dict, optional
+        What validators may know besides the data.
 
     Raises
     ------
@@ -132,7 +135,7 @@ def validate(model: type[M], data: Any, where: str) -> M:
         If the data do not fit the model; the message is that of `explain`.
     """
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context=context)
     except ValidationError as error:
         raise InputError(explain(error, where)) from None
 

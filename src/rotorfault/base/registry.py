@@ -1,71 +1,117 @@
 """Registered parts, found by name.
 
-Controllers, plants, winds, faults, references, detectors, allocators and sensors each have a `Registry`. What is
-registered can be named in a scenario, is listed by ``rotorfault list`` and goes through the conformance tests.
+Each kind of part has a `Registry`. What is registered can be named in a scenario, is listed by ``rotorfault list``
+and goes through the conformance tests. Parts of other packages are found by their entry point of the group
+``rotorfault.parts``, whose name is the slot and the part's name: ``wind.gust-front = "package.module:GustFront"``.
+They are imported when they are first asked for.
 """
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+from functools import lru_cache
+from importlib import metadata
+from typing import Any, Generic, Protocol, TypeVar, cast
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.config import Strict
+from rotorfault.base.errors import InputError, unknown
 
-T = TypeVar("T")
+ENTRY_POINTS = "rotorfault.parts"
+
+B = TypeVar("B")
+B_co = TypeVar("B_co", covariant=True)
 
 
-class Registry(Generic[T]):
-    """Named parts of one sort.
+class Kind(Protocol[B_co]):
+    """What makes a part from its settings: a class with `Settings`, or anything that is called like one."""
+
+    @property
+    def Settings(self) -> type[Strict]:
+        """What a user may choose."""
+
+    def __call__(self, settings: Any, /) -> B_co:
+        """Make the part."""
+
+
+class Registry(Generic[B]):
+    """Named parts of one kind.
 
     Parameters
     ----------
     sort : str
         What its members are, in the singular, for messages: "controller", "wind", ...
+    slot : str, optional
+        Name of the slot, by which entry points name it; `sort` if not given.
     """
 
-    def __init__(self, sort: str) -> None:
+    def __init__(self, sort: str, slot: str | None = None) -> None:
         self.sort = sort
-        self._members: dict[str, T] = {}
+        self._slot = sort if slot is None else slot
+        self._members: dict[str, Kind[B]] = {}
 
-    def register(self, name: str) -> Callable[[T], T]:
-        """Decorator that registers a part under a name; the last registration of a name holds."""
+    def add(self, name: str, kind: Kind[B]) -> None:
+        """Register a part under a name; the last registration of a name holds."""
+        self._members[name] = kind
 
-        def keep(member: T) -> T:
-            self._members[name] = member
-            return member
+    def remove(self, name: str) -> None:
+        """Forget a part, as tests do with parts of their own."""
+        self._members.pop(name, None)
 
-        return keep
+    def _names(self) -> list[str]:
+        return [*self._members, *(name for name in _outside(self._slot) if name not in self._members)]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._members)
+        return iter(self._names())
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._members
+    def __contains__(self, name: object) -> bool:
+        return name in self._members or name in _outside(self._slot)
 
-    def items(self) -> list[tuple[str, T]]:
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def items(self) -> list[tuple[str, Kind[B]]]:
         """All names with their parts, in order of registration."""
-        return list(self._members.items())
+        return [(name, self[name]) for name in self]
 
     def summary(self, name: str) -> str:
         """First line of the docstring of a part."""
-        return (self._members[name].__doc__ or "").strip().partition("\n")[0]
+        return (self[name].__doc__ or "").strip().partition("\n")[0]
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: str) -> Kind[B]:
         """Find a part.
 
         Raises
         ------
         InputError
-            If there is no such name; the message lists those that exist and the nearest one.
+            If there is no such name (the message lists those that exist and the nearest one), or an entry point
+            cannot be loaded.
         """
         if name in self._members:
             return self._members[name]
-        raise InputError(unknown(self.sort, name, list(self._members)))
+        if name in _outside(self._slot):
+            self._members[name] = cast("Kind[B]", _loaded(_outside(self._slot)[name]))
+            return self._members[name]
+        raise InputError(unknown(self.sort, name, list(self)))
 
 
-def unknown(sort: str, name: object, allowed: list[str]) -> str:
-    """One line for a name that does not exist: what came, what is allowed, the nearest."""
-    close = difflib.get_close_matches(str(name), allowed, n=1, cutoff=0.5)
-    hint = f"; did you mean '{close[0]}'?" if close else ""
-    return f"unknown {sort} '{name}'{hint} (allowed: {', '.join(allowed)})"
+@lru_cache(maxsize=64)
+def _outside(slot: str) -> dict[str, metadata.EntryPoint]:
+    """Entry points of other packages for a slot, by the part's name."""
+    points = _entry_points()
+    return {name.partition(".")[2]: point for name, point in points.items() if name.partition(".")[0] == slot}
+
+
+@lru_cache(maxsize=1)
+def _entry_points() -> dict[str, metadata.EntryPoint]:
+    return {point.name: point for point in metadata.entry_points(group=ENTRY_POINTS)}
+
+
+def _loaded(point: metadata.EntryPoint) -> Callable[..., Any]:
+    try:
+        part: Callable[..., Any] = point.load()
+    except Exception as error:
+        raise InputError(
+            f"entry point {point.name} = {point.value}: {type(error).__name__}: {' '.join(str(error).split())}; "
+            "mend or uninstall the package that brings it"
+        ) from error
+    return part

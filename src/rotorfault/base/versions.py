@@ -1,4 +1,4 @@
-"""Versions of what the numbers of a flight depend on."""
+"""Versions of what the numbers of a flight depend on, and the digest of its source."""
 
 from __future__ import annotations
 
@@ -12,8 +12,20 @@ from rotorfault._version import __version__
 
 _LIBRARIES = ("numpy", "scipy", "xarray", "h5netcdf", "llvmlite")
 
-# Parts of the package that cannot change a flight's numbers.
-_IDLE = ("report", "studies", "bench", "cli", "base/progress.py", "tuning", "campaigns/report")
+FLIGHT = (
+    "base",
+    "maths",
+    "model",
+    "reference",
+    "plant",
+    "autopilot",
+    "scenario",
+    "loop",
+    "engine",
+    "results",
+    "flight",
+)
+"""Rooms that a flight's numbers depend on; what is compiled too."""
 
 
 def versions() -> dict[str, str]:
@@ -21,21 +33,22 @@ def versions() -> dict[str, str]:
     return {"rotorfault": __version__, "python": platform.python_version(), **_libraries()}
 
 
-@lru_cache(maxsize=4)
-def source_digest(idle: tuple[str, ...] = _IDLE) -> str:
-    """Digest of all source, and of all data that comes with it, that a flight's numbers depend on.
+@lru_cache(maxsize=8)
+def source_digest(*more: str) -> str:
+    """Digest of the source, and of the data that comes with it, that a flight's numbers depend on.
 
     Parameters
     ----------
-    idle : tuple of str, optional
-        Folders at the top of the package, and files, that cannot change them.
+    *more : str
+        Further rooms (folders of the package, such as "campaigns/sampling") or files that matter.
     """
     root = Path(__file__).parent.parent
     digest = hashlib.sha256()
-    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".toml")):
-        place = path.relative_to(root)
-        if not {place.parts[0], place.as_posix(), place.parent.as_posix()} & set(idle):
-            digest.update(f"{place.as_posix()}\n".encode())
+    for place in (*FLIGHT, *more):
+        top = root / place
+        files = [top] if top.is_file() else sorted(p for p in top.rglob("*") if p.suffix in (".py", ".toml"))
+        for path in files:
+            digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
             digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 

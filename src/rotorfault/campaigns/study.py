@@ -20,7 +20,7 @@ from pydantic import Field, field_validator, model_validator
 
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 from rotorfault.campaigns.grades import GRADES, SURVIVED
 from rotorfault.campaigns.sampling.axes import AXES, axis
 from rotorfault.campaigns.sampling.refine import Refinement, looks

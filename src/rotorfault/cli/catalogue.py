@@ -15,7 +15,8 @@ from rotorfault.autopilot.presets import presets
 from rotorfault.base.config import parse_toml, read_text
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import output_folder, write_atomically
-from rotorfault.base.registry import Registry, unknown
+from rotorfault.base.registry import Registry
+from rotorfault.base.errors import unknown
 from rotorfault.campaigns.studies import study_names
 from rotorfault.engine import ENGINES
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names

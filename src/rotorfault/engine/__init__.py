@@ -9,8 +9,7 @@ import importlib
 import importlib.util
 from typing import cast
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.engine.batch import Engine
 
 ENGINES = {

@@ -9,7 +9,6 @@ from rotorfault.engine.batch import (
     Recording,
     Records,
     Watch,
-    as_drive,
     columns,
     drive_rows,
     drive_template,
@@ -31,7 +30,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
             for first, rows in drive_rows(batch):
                 wanted = set(recorded(batch, first, len(rows)))
                 for k, row in enumerate(np.broadcast_to(rows, (*rows.shape[:2], batch.flights))):
-                    state, signals = batch.loop.step(state, as_drive(unflatten(template, list(row))), parameters)
+                    state, signals = batch.loop.step(state, unflatten(template, list(row)), parameters)
                     done += 1
                     if k in wanted:
                         records.add(first + k, columns(signals, batch.flights)[None])

@@ -8,13 +8,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.noise import GUSTS, SENSOR_NOISE, Noise, Stream
+from rotorfault.engine.noise import Noise, Stream
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
-from rotorfault.maths.geometry import zeros
-from rotorfault.maths.records import flatten, leaf_names
-from rotorfault.model.signals import Reference
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.plant.sensors import no_noise
+from rotorfault.maths.records import flatten, leaf_names, record_type
 
 Array = NDArray[np.float64]
 CHUNK = 500  # steps between two looks at progress, noise and flights that are over
@@ -26,11 +22,11 @@ class Batch(NamedTuple):
     loop: ClosedLoop
     state: LoopState  # leaves are floats, or arrays (N,)
     parameters: LoopParameters  # leaves are floats, or arrays (N,)
-    reference: Array  # (steps, 12): rows of `Reference`, shared by all flights
+    reference: Array  # (steps, 12 and more): `Reference` and the source's own signals, shared by all flights
     flights: int  # N
     seeds: tuple[tuple[int, int], ...]  # (seed, flight index) per flight: names its random numbers
     every: int = 1  # record each so many steps; 0 records nothing
-    wanted: tuple[int, ...] | None = None  # rows of `Signals` that are recorded; None for all
+    wanted: tuple[int, ...] | None = None  # rows of the loop's layout that are recorded; None for all
 
     @property
     def steps(self) -> int:
@@ -41,7 +37,9 @@ class Batch(NamedTuple):
 class Recording(NamedTuple):
     """What came of a batch; a batch whose flights were all over early has fewer records."""
 
-    signals: Array  # (records, recorded rows of `Signals`, N); NaN after the first record from a flight's end on
+    signals: (
+        Array  # (records, recorded rows of the loop's layout, N); NaN after the first record from a flight's end on
+    )
     steps: Array  # (records,): number of the step at which each record was taken
     state: Array  # (leaves of `LoopState`, N): at the end, scores included
     flown: int  # flight-steps that were computed
@@ -64,19 +62,18 @@ def no_watch(done: int) -> bool:
     return False
 
 
-def streams_of(batch: Batch) -> list[Stream]:
-    """The streams that a batch draws from at every step, in the order of their rows."""
-    loop = batch.loop
-    return [SENSOR_NOISE] * loop.sensors.needs_noise + [GUSTS] * loop.plant.wind.needs_noise
+def streams_of(batch: Batch) -> dict[str, Stream]:
+    """The streams that a batch draws from at every step, by slot, in the order of their rows."""
+    return {slot.name: Stream(part.normals, slot.streams[0]) for slot, part in batch.loop.each() if part.normals}
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
     """First step and rows of the drive, chunk by chunk.
 
-    The rows have shape (steps of the chunk, 12, 1) without noise and (steps of the chunk, rows, N) with it: twelve
-    rows more for sensors that need noise, and then three more for a wind that does.
+    The rows have shape (steps of the chunk, shared rows, 1) without noise and (steps of the chunk, rows, N) with it:
+    normal numbers of each stream follow the shared ones.
     """
-    noise = [Noise(batch.seeds, stream) for stream in streams_of(batch)]
+    noise = [Noise(batch.seeds, stream) for stream in streams_of(batch).values()]
     for first in range(0, batch.steps, CHUNK):
         reference = batch.reference[first : first + CHUNK, :, None]
         if not noise:
@@ -86,24 +83,11 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
             yield first, np.concatenate([shared, *(part.draw(len(reference)) for part in noise)], axis=1)
 
 
-def no_reference() -> Reference:
-    """The origin, at rest."""
-    zero = zeros()
-    return Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
-
-
-def drive_template(batch: Batch) -> Any:
-    """A record of the shape that the rows of `drive_rows` flatten: a drive, empty where nothing is drawn."""
-    loop = batch.loop
-    sensors: Any = no_noise() if loop.sensors.needs_noise else ()
-    gust: Any = zeros() if loop.plant.wind.needs_noise else ()
-    return Drive(no_reference(), sensors, gust)
-
-
-def as_drive(record: Any) -> Drive:
-    """The drive that a record of the shape of `drive_template` stands for."""
-    noise = no_noise() if record.noise == () else record.noise
-    return Drive(record.reference, noise, zeros() if record.gust == () else record.gust)
+def drive_template(batch: Batch) -> Drive:
+    """A record of the shape that the rows of `drive_rows` flatten."""
+    streams = streams_of(batch)
+    record = record_type("Normals", tuple(streams))
+    return batch.loop.drive()._replace(normals=record(*((0.0,) * stream.width for stream in streams.values())))
 
 
 def columns(record: Any, count: int, part: slice = slice(None)) -> Array:
@@ -165,7 +149,7 @@ class Records:
         self._ends = ends_of(batch)
         self._rows = None if batch.wanted is None else list(batch.wanted)
         capacity = 0 if batch.every == 0 else -(-batch.steps // batch.every)
-        width = len(SIGNAL_NAMES) if self._rows is None else len(self._rows)
+        width = len(batch.loop.layout) if self._rows is None else len(self._rows)
         self._signals = np.empty((capacity, width, batch.flights))
         if batch.flights > 1:
             self._signals[:] = np.nan  # for flights that are dropped because they are over
@@ -178,7 +162,7 @@ class Records:
         ----------
         step : int
             A multiple of `every`.
-        signals : ndarray, shape (records, rows of `Signals`, flights)
+        signals : ndarray, shape (records, rows of the loop's layout, flights)
         flights : slice or array of int
             Which of the batch they are.
         """

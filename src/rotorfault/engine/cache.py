@@ -15,13 +15,13 @@ import hashlib
 import json
 import os
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rotorfault.base.files import write_atomically
+from rotorfault.base.versions import source_digest
 from rotorfault.engine.program import Layout
-from rotorfault.engine.structure import parts_of, structure
+from rotorfault.engine.structure import foreign, structure
 from rotorfault.loop.closed_loop import ClosedLoop
 
 KEEP = 200  # compiled loops on disk
@@ -50,9 +50,9 @@ def key(loop: ClosedLoop, compiler: str, form: str) -> str | None:
     form : str
         Which of the programs of the loop.
     """
-    if any(not type(part).__module__.startswith("rotorfault.") for part in parts_of(loop)):
+    if foreign(loop):
         return None
-    return _digest(_package_digest(), compiler, form, *structure(loop))
+    return _digest(source_digest(), compiler, form, *structure(loop))
 
 
 def key_of_program(text: str, compiler: str) -> str:
@@ -128,12 +128,3 @@ def _store(path: Path | None, made: Compiled) -> None:
         write_atomically(path, lambda temporary: temporary.write_bytes(content))
     except OSError:
         return  # a cache that cannot be written costs a second next time, nothing else
-
-
-@lru_cache(maxsize=1)
-def _package_digest() -> str:
-    root = Path(__file__).parent.parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()

@@ -35,11 +35,6 @@ class Stream(NamedTuple):
     word: int  # tells it from the others of the same flight
 
 
-SENSOR_NOISE = Stream(12, 0)  # `rotorfault.plant.sensors.Normals`
-GUSTS = Stream(3, 1)  # `rotorfault.loop.closed_loop.Drive.gust`
-FIRST_GUST = Stream(6, 2)  # `rotorfault.plant.wind.FirstNormals`, at step 0 only
-
-
 def counter_word(stream: Stream, block: int) -> int:
     """The second word of the counter; the first is the step."""
     return stream.word << 32 | block
@@ -92,7 +87,7 @@ def normals(seeds: Sequence[tuple[int, int]], stream: Stream, first: int, steps:
 class Noise:
     """The numbers of one stream of some flights, drawn in order of steps, in whatever pieces."""
 
-    def __init__(self, seeds: Sequence[tuple[int, int]], stream: Stream = SENSOR_NOISE) -> None:
+    def __init__(self, seeds: Sequence[tuple[int, int]], stream: Stream) -> None:
         self._seeds, self._stream, self._step = seeds, stream, 0
 
     def draw(self, steps: int) -> Array:

@@ -22,7 +22,7 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from rotorfault.engine.batch import Batch, as_drive, drive_template, streams_of
+from rotorfault.engine.batch import Batch, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.trace import Tape, Term
@@ -71,7 +71,7 @@ class Program(NamedTuple):
 def trace(batch: Batch) -> Traced:
     """Run the closed loop of a batch once, on terms."""
     loop, template = batch.loop, drive_template(batch)
-    shared = len(flatten(template.reference))
+    shared = batch.reference.shape[1]
     layout = Layout(
         parameters=len(flatten(batch.parameters)) + len(SEED),
         prepared=0,
@@ -84,10 +84,10 @@ def trace(batch: Batch) -> Traced:
     seed, index = (tape.term("par", layout.parameters - len(SEED) + i) for i in range(len(SEED)))
     normals = [
         tape.term("normal", seed, index, state.steps, *stream, number)
-        for stream in streams_of(batch)
+        for stream in streams_of(batch).values()
         for number in range(stream.width)
     ]
-    drive = as_drive(unflatten(template, [*tape.leaves("shared", shared), *normals]))
+    drive = unflatten(template, [*tape.leaves("shared", shared), *normals])
     if loop.plant.substeps <= MOST_IN_ONE:
         after, signals = loop.step(state, drive, parameters)
         writes = [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(after))]
@@ -95,7 +95,7 @@ def trace(batch: Batch) -> Traced:
         return Traced((only,), 1, layout._replace(signals=len(only.signals)))
 
     held, command, signals = loop.decide(state, drive, parameters)
-    command = loop.plant.limited(command, parameters.plant)
+    command = loop.limited(command, parameters)
     decided = flatten(held)
     kept = flatten((command, state.steps * parameters.period))
     writes = [("%state", row, tape.lift(x)) for row, x in enumerate(decided)]
@@ -103,10 +103,10 @@ def trace(batch: Batch) -> Traced:
     instant = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
 
     tape = Tape()
-    plant, parameters = _symbols(tape, "state", batch.state.plant), _symbols(tape, "par", batch.parameters)
+    state, parameters = _symbols(tape, "state", batch.state), _symbols(tape, "par", batch.parameters)
     command, start = unflatten((Command(PerRotor.all(0.0), zeros()), 0.0), tape.leaves("kept", len(kept)))
     dt = parameters.period * (1.0 / loop.plant.substeps)
-    moved = loop.plant.substep(plant, command, start + tape.term("count", 0) * dt, parameters.plant, dt)
+    moved = loop.substep(state, command, start + tape.term("count", 0) * dt, parameters, dt)
     move = Section(tape, [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(moved))], [])
     return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
 

@@ -10,7 +10,6 @@ from rotorfault.engine.batch import (
     Recording,
     Records,
     Watch,
-    as_drive,
     columns,
     drive_rows,
     drive_template,
@@ -20,7 +19,7 @@ from rotorfault.engine.batch import (
 )
 from rotorfault.loop.closed_loop import LoopState
 from rotorfault.maths.records import flatten, unflatten
-from rotorfault.model.telemetry import SIGNAL_NAMES, Signals
+from rotorfault.model.block import Record
 
 
 def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Recording:
@@ -33,7 +32,7 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
     parameters = [unflatten(batch.parameters, numbers[:, i].tolist()) for i in range(batch.flights)]
     states = [unflatten(batch.state, starts[:, i].tolist()) for i in range(batch.flights)]
     lost = [False] * batch.flights
-    missing = [np.nan] * len(SIGNAL_NAMES)
+    missing = [np.nan] * len(batch.loop.layout)
     records, done, interrupted, ends = Records(batch), 0, False, ends_of(batch)
 
     def state() -> Array:
@@ -45,8 +44,8 @@ def run(batch: Batch, watch: Watch = no_watch, threads: int | None = None) -> Re
             for k, row in enumerate(rows):
                 taken: list[list[float]] = []
                 for i in range(batch.flights):
-                    drive = as_drive(unflatten(template, row[:, min(i, row.shape[1] - 1)].tolist()))
-                    signals: Signals | None = None
+                    drive = unflatten(template, row[:, min(i, row.shape[1] - 1)].tolist())
+                    signals: Record | None = None
                     if not lost[i]:
                         try:
                             states[i], signals = batch.loop.step(states[i], drive, parameters[i])

@@ -1,8 +1,8 @@
 """The structure of a closed loop: all that decides which operations it consists of.
 
 By the house rule every float of a part is a number in its parameters, so that it may differ between the flights of
-a batch; texts, booleans and whole numbers in settings are choices of structure. Allocators have no parameters and
-parts from outside the package may keep any rule: their floats count as structure.
+a batch; texts, booleans and whole numbers in settings are choices of structure. Parts from outside the package may
+keep any rule: their floats count as structure.
 """
 
 from __future__ import annotations
@@ -11,28 +11,21 @@ from typing import Any
 
 import numpy as np
 
+from rotorfault.base.foreign import is_own
 from rotorfault.loop.closed_loop import ClosedLoop
 from rotorfault.maths.geometry import Value
 
 
 def structure(loop: ClosedLoop) -> tuple[str, ...]:
     """Words that are equal for two loops exactly when their compiled code is."""
-    plant, autopilot = loop.plant, loop.autopilot
-    words = [describe(part) for part in (plant.model, plant.wind, *plant.faults, loop.sensors)]
-    words += [
-        describe(part) for part in (plant.ground, autopilot.diagnoser, autopilot.response, autopilot.controller)
-    ]
-    words.append(describe(autopilot.allocator, floats=True))
-    return (*words, repr(autopilot.diagnoser.oracle_delay), repr(plant.substeps))
+    parts = (f"{slot.name}: {describe(part)}" for slot, part in loop.each())
+    reference = f"{loop.reference.__module__}.{loop.reference.__qualname__}"
+    return (*parts, reference, repr(loop.plant.substeps))
 
 
-def parts_of(loop: ClosedLoop) -> list[Any]:
-    """All parts of a loop."""
-    plant, autopilot = loop.plant, loop.autopilot
-    return [
-        plant.model, plant.wind, *plant.faults, *([] if plant.ground is None else [plant.ground]), loop.sensors,
-        autopilot.diagnoser, autopilot.response, autopilot.controller, autopilot.allocator,
-    ]  # fmt: skip
+def foreign(loop: ClosedLoop) -> bool:
+    """Whether a part of a loop comes from outside the package."""
+    return any(not is_own(type(part).__module__) for _, part in loop.each()) or not is_own(loop.reference.__module__)
 
 
 def describe(value: Any, floats: bool = False) -> str:
@@ -51,8 +44,10 @@ def describe(value: Any, floats: bool = False) -> str:
         return f"{type(value).__name__}[{', '.join(describe(item, floats) for item in value)}]"
     if isinstance(value, dict):
         return f"{{{', '.join(f'{key}: {describe(item, floats)}' for key, item in value.items())}}}"
+    if isinstance(value, type):
+        return f"{value.__module__}.{value.__qualname__}"
     kind = type(value)
-    floats = floats or not kind.__module__.startswith("rotorfault.")
+    floats = floats or not is_own(kind.__module__)
     if callable(value) or (not hasattr(value, "__dict__") and hasattr(kind, "__slots__")):
         # Nothing can be told of it but which one it is.
         return f"{kind.__module__}.{kind.__qualname__} at {id(value)}"

@@ -1,116 +1,93 @@
-"""From scenarios to batches: make every part, collect its numbers, tabulate the reference."""
+"""From scenarios to batches: make every part, collect its numbers, tabulate the reference.
+
+One way for one flight and for many: a *group* of flights that differ in numbers only shares one loop; each part is
+made and checked once for each different set of its own numbers, not once for each flight.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, NamedTuple, TypeVar, final
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter, ValidationError
 
-from rotorfault.autopilot.autopilot import Autopilot
+from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
-from rotorfault.engine.batch import Array, Batch, columns, no_reference
-from rotorfault.engine.noise import FIRST_GUST, SENSOR_NOISE, Noise, Stream
+from rotorfault.engine.batch import Array, Batch, columns
+from rotorfault.engine.noise import Stream, normals
 from rotorfault.engine.structure import structure
-from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, Start
-from rotorfault.loop.scoring import AT_LIMIT, SETTLED, TRACKED, ScoringParameters, bands
+from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
+from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.geometry import Vec3
-from rotorfault.maths.records import flatten, unflatten
-from rotorfault.maths.scalar import maximum
-from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant import PLANTS, Ground, no_first_normals, no_noise
-from rotorfault.plant.plant import Plant
-from rotorfault.reference.sources import ReferenceTable
-from rotorfault.scenario.scenario import Scenario
+from rotorfault.maths.records import flatten, record_type, unflatten
+from rotorfault.model.block import Context, Record
+from rotorfault.model.slot import Slot
+from rotorfault.plant.ground import GROUND
+from rotorfault.reference import REFERENCE, ReferenceSource
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.part import Part
+from rotorfault.scenario.scenario import Scenario, scenario_fields, scenario_from
+from rotorfault.scenario.slots import SLOTS
 
 R = TypeVar("R")
+Own = Mapping[Slot[Any], AnyBlock]
+"""Parts that fly in place of a scenario's, such as a controller that a user hands in."""
 
 
-def assemble(scenario: Scenario, controller: Any = None) -> Batch:
+class Group(NamedTuple):
+    """Flights that differ in numbers only."""
+
+    scenario: Scenario
+    flights: NDArray[np.intp]  # which of all
+    columns: dict[str, Array]  # numbers, one per flight of the group
+    seeds: NDArray[np.int64]
+
+
+def assemble(scenario: Scenario, own: Own | None = None) -> Batch:
     """A batch of the one flight that a scenario describes.
 
     Parameters
     ----------
     scenario : Scenario
-    controller : Controller, optional
-        Flies in place of the scenario's.
+    own : mapping of Slot to Block, optional
+        Parts in place of the scenario's.
 
     Raises
     ------
     InputError
         If the reference is not finite, or a part cannot be made for this vehicle and sampling period.
     """
-    loop = build(scenario, controller)
-    reference = reference_of(scenario)
-    parameters = LoopParameters(
-        plant=loop.plant.parameters(scenario.mismatch.applied(scenario.vehicle.vehicle)),
-        autopilot=loop.autopilot.parameters(scenario.vehicle.vehicle, scenario.period),
-        sensors=loop.sensors.parameters(),
-        period=scenario.period,
-        scoring=scoring_parameters(
-            np.array(scenario.start.position), scenario.vehicle.vehicle, scenario.ground, reference
-        ),
-    )
-    seeds = ((scenario.seed, 0),)
-    state = initial_state(loop, start_of(scenario), reference, seeds, parameters)
-    return Batch(loop, state, parameters, reference, 1, seeds, scenario.every)
+    return assemble_group(Group(scenario, np.zeros(1, dtype=np.intp), {}, np.array([scenario.seed])), own=own)
 
 
-def build(scenario: Scenario, controller: Any = None) -> ClosedLoop:
-    """The parts of a scenario put together; see `assemble`."""
-    plant = Plant(
-        PLANTS[scenario.plant](),
-        scenario.wind.make(),
-        [fault.make() for fault in scenario.fault],
-        scenario.substeps,
-        None if scenario.ground is None else Ground(scenario.ground),
-    )
-    autopilot = Autopilot(
-        scenario.diagnosis.make(),
-        scenario.controller.make() if controller is None else controller,
-        scenario.allocation.make(),
-        scenario.on_fault.make(),
-    )
-    return ClosedLoop(plant, scenario.sensors.make(), autopilot)
+def assemble_group(group: Group, part: slice = slice(None), own: Own | None = None) -> Batch:
+    """The batch of a group, or of some of its flights.
 
-
-def reference_of(scenario: Scenario) -> Array:
-    """Rows (steps, 12) of `Reference`, one for each sampling instant.
+    Parameters
+    ----------
+    group : Group
+    part : slice, optional
+        Which of its flights.
+    own : mapping of Slot to Block, optional
+        Parts in place of the scenario's.
 
     Raises
     ------
     InputError
-        If one is not finite.
+        If a value is not allowed; names the flight.
     """
-    times = np.arange(scenario.steps) * scenario.period
-    with np.errstate(all="ignore"):
-        rows = reference_rows(scenario.reference.make().table(times))
-    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(wrong):
-        raise InputError(
-            f"reference: position, velocity or acceleration at t = {times[wrong[0]]:g} s is not finite; "
-            "its numbers are too large, or its times too short"
-        )
-    return rows
-
-
-def initial_state(
-    loop: ClosedLoop, start: Start, reference: Array, seeds: tuple[tuple[int, int], ...], parameters: LoopParameters
-) -> LoopState:
-    """State before the first step, for one flight or, with leaves of N numbers, for N."""
-    if loop.plant.wind.needs_noise:
-        start = start._replace(gust=_first_noise(no_first_normals(), seeds, FIRST_GUST))
-    noise = _first_noise(no_noise(), seeds, SENSOR_NOISE) if loop.sensors.needs_noise else no_noise()
-    first = unflatten(no_reference(), reference[0].tolist())
-    # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
-    # must begin the same alone and in any batch.
-    many = unflatten(start, list(columns(start, len(seeds))))
-    state = loop.initial(many, Drive(first, noise), parameters)
-    return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
+    return _Assembly(group, part, own or {}).batch()
 
 
 def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     """One batch of several flights that differ in numbers only: vehicle, start, wind, faults, gains, seed.
+
+    Parameters
+    ----------
+    scenarios : sequence of Scenario
+        At least one.
 
     Raises
     ------
@@ -137,37 +114,68 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     )
 
 
-def scoring_parameters(
-    position: Array, vehicle: Vehicle, ground: float | None, reference: Array
-) -> ScoringParameters:
-    """What scoring needs to know of a flight.
+def _stacked(template: R, records: Sequence[R]) -> R:
+    rows = np.array([[float(leaf) for leaf in flatten(record)] for record in records]).T
+    return unflatten(template, list(rows))
+
+
+def build(scenario: Scenario, own: Own | None = None) -> ClosedLoop:
+    """The parts of a scenario put together; see `assemble`."""
+    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, source_of(scenario, own or {}).Telemetry)
+
+
+def parts_of(scenario: Scenario, own: Own) -> dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]:
+    """The parts of a scenario by slot, in order; without the reference, which is tabulated before the flight."""
+    parts: dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]] = {}
+    for slot in SLOTS:
+        if slot.side == "task":
+            continue
+        if slot in own:
+            parts[slot] = own[slot]
+        elif slot.many:
+            parts[slot] = tuple(part.make() for part in scenario.all(slot))
+        elif (part := scenario.maybe(slot)) is not None:
+            parts[slot] = part.make()
+    return parts
+
+
+def source_of(scenario: Scenario, own: Own) -> ReferenceSource:
+    """The reference of a scenario."""
+    mine = own.get(REFERENCE)
+    return mine if isinstance(mine, ReferenceSource) else scenario[REFERENCE].make()
+
+
+def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> Array:
+    """Rows of `Reference` and of the source's own signals, one for each sampling instant.
 
     Parameters
     ----------
-    position : ndarray, shape (..., 3)
-        Where it begins, in m.
-    vehicle : Vehicle
-        As the autopilot believes it to be.
-    ground : float or None
-        Height of the ground in m.
-    reference : ndarray, shape (steps, 12)
-        Rows of `Reference`.
+    scenario : Scenario
+    source : ReferenceSource, optional
+        In place of the scenario's.
+
+    Returns
+    -------
+    ndarray, shape (steps, 12 and own)
+
+    Raises
+    ------
+    InputError
+        If one is not finite.
     """
-    margin = AT_LIMIT * maximum(1.0, vehicle.thrust_max)
-    settle, track = (np.moveaxis(bands(reference[:, :3], position, share), -1, 0) for share in (SETTLED, TRACKED))
-    return ScoringParameters(
-        settle_band=Vec3.of(settle),
-        track_band=Vec3.of(track),
-        half=float(len(reference) // 2),
-        command_low=vehicle.thrust_min + margin,
-        command_high=vehicle.thrust_max - margin,
-        ground=0.0 if ground is None else ground,
-    )
-
-
-def _stacked(template: Any, records: list[Any]) -> Any:
-    rows = np.array([[float(leaf) for leaf in flatten(record)] for record in records]).T
-    return unflatten(template, list(rows))
+    source = scenario[REFERENCE].make() if source is None else source
+    times = np.arange(scenario.steps) * scenario.period
+    with np.errstate(all="ignore"):
+        table = source.table(times)
+        own = [np.broadcast_to(leaf, times.shape) for leaf in flatten(source.signals(times))]
+        rows = np.column_stack([*table, *own])
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(wrong):
+        raise InputError(
+            f"reference: position, velocity or acceleration at t = {times[wrong[0]]:g} s is not finite; "
+            "its numbers are too large, or its times too short"
+        )
+    return rows
 
 
 def start_of(scenario: Scenario) -> Start:
@@ -176,10 +184,167 @@ def start_of(scenario: Scenario) -> Start:
     return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
 
 
-def _first_noise(template: R, seeds: tuple[tuple[int, int], ...], stream: Stream) -> R:
-    return unflatten(template, list(Noise(seeds, stream).draw(1)[0]))
+def first_normals(loop: ClosedLoop, seeds: tuple[tuple[int, int], ...]) -> Any:
+    """Standard normal numbers for `initial` of the parts that need some, by slot, each of shape (N,)."""
+    streams: dict[str, Stream] = {}
+    for slot, part in loop.each():
+        if part.first_normals is not None:
+            streams[slot.name] = Stream(part.first_normals, slot.streams[1])
+        elif part.normals:
+            streams[slot.name] = Stream(part.normals, slot.streams[0])
+    record = record_type("FirstNormals", tuple(streams))
+    return record(*(tuple(normals(seeds, stream, 0, 1)[0]) for stream in streams.values()))
 
 
-def reference_rows(table: ReferenceTable) -> Array:
-    """A reference table as rows (n, 12) in the order of `Reference`."""
-    return np.column_stack([table.p_W, table.v_W, table.a_W, table.yaw, table.yaw_rate, table.yaw_acceleration])
+def initial_state(
+    loop: ClosedLoop, start: Start, reference: Array, seeds: tuple[tuple[int, int], ...], parameters: LoopParameters
+) -> LoopState:
+    """State before the first step, for one flight or, with leaves of N numbers, for N."""
+    drive = unflatten(loop.drive(), reference[0].tolist())
+    # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
+    # must begin the same alone and in any batch.
+    many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=first_normals(loop, seeds))
+    state = loop.initial(many, drive, parameters)
+    return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
+
+
+@final
+class _Assembly:
+    """Builds the batch of some flights of a group.
+
+    Parameters
+    ----------
+    group : Group
+    part : slice
+        Which of its flights.
+    own : mapping of Slot to Block
+        Parts in place of the scenario's.
+    """
+
+    def __init__(self, group: Group, part: slice, own: Own) -> None:
+        self.scenario, self.own = group.scenario, own
+        self.flights = group.flights[part]
+        self.columns = {key: column[part] for key, column in group.columns.items()}
+        self.seeds = tuple((int(seed), 0) for seed in group.seeds[part])
+        self.count = len(self.flights)
+        self._objects: dict[str, tuple[list[Any], NDArray[np.intp]]] = {}
+        self._tables = self.scenario.as_tables() if self.columns else {}
+
+    def batch(self) -> Batch:
+        """Loop, state, numbers and reference of the flights."""
+        scenario, source = self.scenario, source_of(self.scenario, self.own)
+        loop = ClosedLoop(parts_of(scenario, self.own), scenario.substeps, source.Telemetry)
+        reference = reference_of(scenario, source)
+        believed = self.numbers(("vehicle",), lambda v: v.vehicle)
+        parameters = LoopParameters(
+            vehicle=self.numbers(("vehicle", "mismatch"), lambda v, m: m.applied(v.vehicle)),
+            belief=believed,
+            parts=loop.record(*(self._part_numbers(slot) for slot in loop.parts)),
+            period=scenario.period,
+        )
+        start = self.numbers(("start",), lambda s: start_of(scenario.model_copy(update={"start": s})))
+        position = np.stack([np.broadcast_to(x, (self.count,)) for x in start.p_W], axis=-1)
+        ground = loop.maybe(GROUND)
+        scoring = scoring_parameters(
+            position if self.count > 1 else position[0],
+            believed.thrust_min,
+            believed.thrust_max,
+            0.0 if ground is None else ground.height(parameters.parts.ground),
+            reference,
+        )
+        parameters = parameters._replace(scoring=scoring)
+        state = initial_state(loop, start, reference, self.seeds, parameters)
+        return Batch(loop, state, parameters, reference, self.count, self.seeds, scenario.every)
+
+    def _part_numbers(self, slot: Slot[Any]) -> Any:
+        """The numbers of the part of a slot, or of its parts."""
+        period = self.scenario.period
+        # What a part of the truth is told of is the true vehicle.
+        about = ("vehicle", "mismatch") if slot.side == "truth" else ("vehicle",)
+
+        def context(vehicle: Any, mismatch: Any = None) -> Context:
+            numbers = vehicle.vehicle if mismatch is None else mismatch.applied(vehicle.vehicle)
+            return Context(numbers, period)
+
+        def record(part: Part[AnyBlock], *vehicle: Any) -> Record:
+            return part.make().parameters(context(*vehicle))  # type: ignore[no-any-return]
+
+        if slot in self.own:
+            return self.numbers(about, lambda *vehicle: self.own[slot].parameters(context(*vehicle)))
+        if slot.many:
+            names = [f"{slot.name}.{i}" for i in range(len(self.scenario.all(slot)))]
+            return tuple(self.numbers((name, *about), record) for name in names)
+        return self.numbers((slot.name, *about), record)
+
+    def numbers(self, names: Sequence[str], record: Callable[..., Any]) -> Any:
+        """A record of numbers that depends on some parts: floats where they do not vary, else arrays (N,)."""
+        parts = [self.objects(name) for name in names]
+        varying = [inverse for objects, inverse in parts if len(objects) > 1]
+        if not varying:
+            return record(*(objects[0] for objects, _ in parts))
+        pairs, inverse = np.unique(np.stack([inverse for _, inverse in parts]), axis=1, return_inverse=True)
+        made = [record(*(objects[i] for (objects, _), i in zip(parts, pair, strict=True))) for pair in pairs.T]
+        rows, place = np.array([[float(leaf) for leaf in flatten(one)] for one in made]).T, inverse.reshape(-1)
+        # What is the same in all stays one number: a hundred thousand flights are held in memory.
+        same = (rows == rows[:, :1]).all(axis=1)
+        return unflatten(made[0], [float(row[0]) if one else row[place] for row, one in zip(rows, same, strict=True)])
+
+    def objects(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
+        """The different objects of a part of the scenario, and which of them each flight has."""
+        if name not in self._objects:
+            self._objects[name] = self._made(name)
+        return self._objects[name]
+
+    def _made(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
+        field, _, index = name.partition(".")
+        keys = [key for key in self.columns if key == name or key.startswith(f"{name}.")]
+        here = getattr(self.scenario, field)
+        if not keys:
+            return [here[int(index)] if index else here], np.zeros(self.count, dtype=np.intp)
+        values, first, inverse = np.unique(
+            np.stack([self.columns[key] for key in keys]), axis=1, return_index=True, return_inverse=True
+        )
+        about = scenario_fields()[field]
+        kind: Any = Annotated[(about.annotation, *about.metadata, Field())]
+        adapter: TypeAdapter[Any] = TypeAdapter(kind)
+        made = []
+        for numbers, flight in zip(values.T.tolist(), first, strict=True):
+            changes = dict(zip(keys, numbers, strict=True))
+            tables = {field: _copied(self._tables[field])}
+            override_all(tables, changes)
+            try:
+                # What is in a checked scenario was allowed when it was checked.
+                one = adapter.validate_python(tables[field], context={"allow_code": True})
+            except ValidationError:
+                # Said once more by the whole scenario, whose message names the key.
+                overridden(self.scenario, changes, f"flight {self.flights[flight]}")
+                raise
+            made.append(one[int(index)] if index else one)
+        return made, inverse.reshape(-1)
+
+
+def _copied(tables: Any) -> Any:
+    if isinstance(tables, dict):
+        return {key: _copied(value) for key, value in tables.items()}
+    return [_copied(value) for value in tables] if isinstance(tables, list) else tables
+
+
+def overridden(scenario: Scenario, changes: Mapping[str, Any], where: str) -> Scenario:
+    """The scenario with other values for some of its keys.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    changes : mapping
+        Dotted keys and values.
+    where : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If a value is not allowed.
+    """
+    tables = scenario.as_tables()
+    override_all(tables, changes)
+    return scenario_from(tables, where, allow_code=True)

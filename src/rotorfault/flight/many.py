@@ -7,7 +7,6 @@ each, and what is recorded where recording is asked for.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -15,15 +14,16 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.progress import Bar
-from rotorfault.base.registry import unknown
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Array, Batch
-from rotorfault.flight.flight import Flight, fly, prepare
-from rotorfault.flight.sweep import Group, assemble_group, checked_columns, groups_of
+from rotorfault.flight.assembly import Group, assemble_group, build
+from rotorfault.flight.flight import Flight
+from rotorfault.flight.fly import fly, prepare
+from rotorfault.flight.sweep import checked_columns, groups_of
 from rotorfault.maths.geometry import Vec3
-from rotorfault.model.telemetry import SIGNAL_NAMES, quantities
+from rotorfault.model.telemetry import Layout
 from rotorfault.results.score_table import ScoreTable, score_table
 from rotorfault.scenario.scenario import Scenario
 
@@ -50,6 +50,8 @@ class Flights:
         What was recorded; no records if nothing was asked for. NaN where a flight was over.
     names : tuple of str
         Of the rows, such as ``position.x``.
+    units : tuple of str
+        Of the rows.
     times : ndarray, shape (records,)
         In s.
     flown : int
@@ -58,10 +60,10 @@ class Flights:
 
     def __init__(
         self, scenario: Scenario, varied: dict[str, NDArray[Any]], table: ScoreTable, signals: Array,
-        names: tuple[str, ...], times: Array, flown: int,
+        names: tuple[str, ...], units: tuple[str, ...], times: Array, flown: int,
     ) -> None:  # fmt: skip
         self.scenario, self.varied, self.table = scenario, varied, table
-        self.signals, self.names, self.times, self.flown = signals, names, times, flown
+        self.signals, self.names, self.units, self.times, self.flown = signals, names, units, times, flown
 
     def __len__(self) -> int:
         return len(self.table)
@@ -88,14 +90,15 @@ class Flights:
 
     def to_xarray(self) -> xr.Dataset:
         """All of it as a dataset over ``flight`` and, for recorded signals, ``time`` [s]."""
-        xarray = importlib.import_module("xarray")
+        # xarray takes longer to load than many flights take to fly.
+        import xarray as xr
+
         variables: dict[str, Any] = {name: ("flight", column) for name, column in self.table.columns.items()}
         variables |= {f"vary.{key}": ("flight", column) for key, column in self.varied.items()}
-        units = {name: quantity.unit for name, (_, quantity) in quantities().items()}
-        for row, name in enumerate(self.names):
-            about = {"units": units[name.partition(".")[0]]}
+        for row, (name, unit) in enumerate(zip(self.names, self.units, strict=True)):
+            about = {"units": unit}
             variables[f"signal.{name}"] = (("time", "flight"), self.signals[:, row], about)
-        return xarray.Dataset(variables, coords={"time": ("time", self.times, {"units": "s"})})  # type: ignore[no-any-return]
+        return xr.Dataset(variables, coords={"time": ("time", self.times, {"units": "s"})})
 
 
 def fly_many(
@@ -108,6 +111,7 @@ def fly_many(
     within: float | None = None,
     engine: str | None = None,
     threads: int | None = None,
+    allow_code: bool = False,
 ) -> Flights:
     """Fly a scenario many times, with any of its values different in each flight.
 
@@ -130,6 +134,8 @@ def fly_many(
         simd or numpy or python; the fastest that is installed if not given.
     threads : int, optional
         One per processor if not given. Nothing in the numbers depends on it.
+    allow_code : bool
+        Whether code that the scenario names may run; code that is named here may.
 
     Returns
     -------
@@ -145,25 +151,27 @@ def fly_many(
     common = dict(settings or {})
     if record_period is not None:
         common["record_period"] = record_period
-    checked = prepare(scenario, None, common)
+    checked = prepare(scenario, None, common, allow_code=allow_code)
     columns = checked_columns(checked, vary)
     count = len(next(iter(columns.values())))
-    rows = _rows(record)
     groups = groups_of(checked, columns)
+    layouts = [build(group.scenario).layout for group in groups] if record else []
+    rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)
+    width = len(rows[0])
     if within is not None and not within > 0.0:
         raise InputError(f"within: got {within!r}; allowed: a length in m above 0")
     if threads is not None and threads < 1:
         raise InputError(f"threads: got {threads!r}; allowed: 1 or more")
     one = groups[0].scenario  # for all, where signals are recorded
-    if rows and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
+    if width and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
         raise InputError("recorded flights must have one length and one recording period; fly them apart")
-    records = -(-one.steps // one.every) if rows else 0
-    if records * len(rows) * count > MOST_NUMBERS:
+    records = -(-one.steps // one.every) if width else 0
+    if records * width * count > MOST_NUMBERS:
         raise InputError(
-            f"record: {records} records of {len(rows)} signals of {count} flights take more memory than there is; "
+            f"record: {records} records of {width} signals of {count} flights take more memory than there is; "
             f"allowed: {MOST_NUMBERS:.1e} numbers; record less, or seldom (record_period)"
         )
-    signals = np.full((records, len(rows), count), np.nan)
+    signals = np.full((records, width, count), np.nan)
     name, flown, done = engine or default_engine(count), 0, 0.0
     tables: list[ScoreTable] = []
     order: list[NDArray[np.intp]] = []
@@ -183,20 +191,23 @@ def fly_many(
     place = np.argsort(np.concatenate(order))
     table = ScoreTable({key: column[place] for key, column in ScoreTable.joined(tables).columns.items()})
     times: Array = np.arange(records, dtype=np.float64) * (one.every * one.period)
-    return Flights(checked, columns, table, signals, tuple(SIGNAL_NAMES[i] for i in rows), times, flown)
+    names, units = _described(rows[0], layouts[0]) if width else ((), ())
+    return Flights(checked, columns, table, signals, names, units, times, flown)
 
 
 def _assembled(
-    groups: list[Group], rows: tuple[int, ...], within: float | None
+    groups: list[Group], rows: list[tuple[int, ...]], within: float | None
 ) -> list[tuple[NDArray[np.intp], float, Batch]]:
     """Which flights, how long, and their batch, some thousands at a time."""
     found = []
     count = sum(len(group.flights) for group in groups)
     with Bar(f"preparing {count}", count, "flights") as bar:
-        for group in groups:
+        for group, wanted in zip(groups, rows, strict=True):
             for first in range(0, len(group.flights), AT_ONCE):
                 part = slice(first, first + AT_ONCE)
-                batch = assemble_group(group, part)._replace(every=group.scenario.every if rows else 0, wanted=rows)
+                batch = assemble_group(group, part)._replace(
+                    every=group.scenario.every if wanted else 0, wanted=wanted
+                )
                 batch = batch if within is None else _settling_within(batch, within)
                 found.append((group.flights[part], group.scenario.duration, batch))
                 bar.update(sum(len(flights) for flights, _, _ in found))
@@ -217,14 +228,21 @@ def _watch(bar: Bar, before: float, batch: Batch, duration: float) -> Any:
     return watch
 
 
-def _rows(record: Sequence[str]) -> tuple[int, ...]:
-    """Rows of `Signals` by names of signals or of components."""
+def _rows(record: Sequence[str], layout: Layout) -> tuple[int, ...]:
+    """Rows of a layout by names of signals or of components."""
     if isinstance(record, str):
         raise InputError(f"record: got {record!r}; allowed: a list of names, such as ['{record}']")
-    found: list[int] = []
+    rows: list[int] = []
     for name in record:
-        rows = [row for row, full in enumerate(SIGNAL_NAMES) if name in (full, full.partition(".")[0])]
-        if not rows:
-            raise InputError(f"record: {unknown('signal', str(name), list(quantities()))}")
-        found += [row for row in rows if row not in found]
-    return tuple(found)
+        matching = layout.matching(str(name))
+        if not matching:
+            raise InputError(f"record: {unknown('signal', str(name), [signal.name for signal in layout.signals])}")
+        rows += [row for row in matching if row not in rows]
+    return tuple(rows)
+
+
+def _described(rows: tuple[int, ...], layout: Layout) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names and units of rows."""
+    units = {row: signal.quantity.unit for signal in layout.signals for row in layout.rows[layout.place(signal.name)]}
+    names = tuple(layout.rows[row] for row in rows)
+    return names, tuple(units[name] for name in names)

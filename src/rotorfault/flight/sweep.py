@@ -9,35 +9,24 @@ Each part is made and checked once for each different set of its own numbers, no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, NamedTuple, final
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, TypeAdapter, ValidationError
 
-from rotorfault.autopilot.autopilot import AutopilotParameters
 from rotorfault.base.errors import InputError
-from rotorfault.engine.batch import Array, Batch
-from rotorfault.flight.assembly import build, initial_state, reference_of, scoring_parameters, start_of
-from rotorfault.loop.closed_loop import LoopParameters
-from rotorfault.maths.records import flatten, unflatten
-from rotorfault.plant.plant import PlantParameters
-from rotorfault.scenario.scenario import Part, Scenario, override, override_all, scenario_from
+from rotorfault.base.foreign import is_own
+from rotorfault.flight.assembly import Group, overridden
+from rotorfault.scenario.overrides import override
+from rotorfault.scenario.part import Part
+from rotorfault.scenario.scenario import Scenario
+from rotorfault.scenario.slots import SLOTS
 
 MOST_SEED = 10**12
-_NUMERIC = ("vehicle", "mismatch", "start", "fault", "wind", "sensors", "controller", "diagnosis", "on_fault")
+_TABLES = ("vehicle", "mismatch", "start")  # of numbers that may vary, besides those of the parts
 
 Columns = Mapping[str, NDArray[Any]]
-
-
-class Group(NamedTuple):
-    """Flights that differ in numbers only."""
-
-    scenario: Scenario
-    flights: NDArray[np.intp]  # which of all
-    columns: dict[str, Array]  # numbers, one per flight of the group
-    seeds: NDArray[np.int64]
 
 
 def checked_columns(scenario: Scenario, vary: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
@@ -94,123 +83,13 @@ def groups_of(scenario: Scenario, columns: Columns) -> list[Group]:
         for i, values in enumerate(zip(*(columns[key].tolist() for key in structural), strict=True)):
             found.setdefault(values, []).append(i)
         parts = [
-            (_overridden(scenario, dict(zip(structural, values, strict=True)), f"flight {which[0]}"), np.array(which))
+            (overridden(scenario, dict(zip(structural, values, strict=True)), f"flight {which[0]}"), np.array(which))
             for values, which in found.items()
         ]
     return [
         Group(one, which, {key: columns[key][which].astype(float) for key in numeric}, seeds[which])
         for one, which in parts
     ]
-
-
-def assemble_group(group: Group, part: slice = slice(None)) -> Batch:
-    """The batch of a group, or of some of its flights.
-
-    Raises
-    ------
-    InputError
-        If a value is not allowed; names the flight.
-    """
-    return _Assembly(group, part).batch()
-
-
-@final
-class _Assembly:
-    def __init__(self, group: Group, part: slice) -> None:
-        self.scenario = group.scenario
-        self.flights = group.flights[part]
-        self.columns = {key: column[part] for key, column in group.columns.items()}
-        self.seeds = tuple((int(seed), 0) for seed in group.seeds[part])
-        self.count = len(self.flights)
-        self._objects: dict[str, tuple[list[Any], NDArray[np.intp]]] = {}
-        self._tables = self.scenario.as_tables()
-
-    def batch(self) -> Batch:
-        scenario, loop = self.scenario, build(self.scenario)
-        reference = reference_of(scenario)
-        plant, period = loop.plant, scenario.period
-        vehicle = self.numbers(("vehicle",), lambda v: v.vehicle)
-        truth = self.numbers(("vehicle", "mismatch"), lambda v, m: m.applied(v.vehicle))
-        wind = self.numbers(("wind",), lambda w: w.make().parameters())
-        faults = tuple(
-            self.numbers((f"fault.{i}",), lambda f: f.make().parameters()) for i in range(len(scenario.fault))
-        )
-        ground: Any = ()
-        if (level := plant.ground) is not None:
-            ground = self.numbers(("vehicle", "mismatch"), lambda v, m: level.parameters(m.applied(v.vehicle)))
-        parameters = LoopParameters(
-            plant=PlantParameters(truth, wind, faults, ground),
-            autopilot=AutopilotParameters(
-                vehicle,
-                self.numbers(("diagnosis", "vehicle"), lambda d, v: d.make().parameters(v.vehicle, period)),
-                self.numbers(("on_fault",), lambda r: r.make().parameters()),
-                self.numbers(("controller", "vehicle"), lambda c, v: c.make().parameters(v.vehicle, period)),
-            ),
-            sensors=self.numbers(("sensors",), lambda s: s.make().parameters()),
-            period=period,
-        )
-        start = self.numbers(("start",), lambda s: start_of(scenario.model_copy(update={"start": s})))
-        position = np.stack([np.broadcast_to(x, (self.count,)) for x in start.p_W], axis=-1)
-        parameters = parameters._replace(scoring=scoring_parameters(position, vehicle, scenario.ground, reference))
-        state = initial_state(loop, start, reference, self.seeds, parameters)
-        return Batch(loop, state, parameters, reference, self.count, self.seeds, scenario.every)
-
-    def numbers(self, names: Sequence[str], record: Callable[..., Any]) -> Any:
-        """A record of numbers that depends on some parts: floats where they do not vary, else arrays (N,)."""
-        parts = [self.objects(name) for name in names]
-        varying = [inverse for objects, inverse in parts if len(objects) > 1]
-        if not varying:
-            return record(*(objects[0] for objects, _ in parts))
-        pairs, inverse = np.unique(np.stack([inverse for _, inverse in parts]), axis=1, return_inverse=True)
-        made = [record(*(objects[i] for (objects, _), i in zip(parts, pair, strict=True))) for pair in pairs.T]
-        rows, place = np.array([[float(leaf) for leaf in flatten(one)] for one in made]).T, inverse.reshape(-1)
-        # What is the same in all stays one number: a hundred thousand flights are held in memory.
-        same = (rows == rows[:, :1]).all(axis=1)
-        return unflatten(made[0], [float(row[0]) if one else row[place] for row, one in zip(rows, same, strict=True)])
-
-    def objects(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
-        """The different objects of a part of the scenario, and which of them each flight has."""
-        if name not in self._objects:
-            self._objects[name] = self._made(name)
-        return self._objects[name]
-
-    def _made(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
-        field, _, index = name.partition(".")
-        keys = [key for key in self.columns if key == name or key.startswith(f"{name}.")]
-        here = getattr(self.scenario, field)
-        if not keys:
-            return [here[int(index)] if index else here], np.zeros(self.count, dtype=np.intp)
-        values, first, inverse = np.unique(
-            np.stack([self.columns[key] for key in keys]), axis=1, return_index=True, return_inverse=True
-        )
-        about = Scenario.model_fields[field]
-        kind: Any = Annotated[(about.annotation, *about.metadata, Field())]
-        adapter: TypeAdapter[Any] = TypeAdapter(kind)
-        made = []
-        for numbers, flight in zip(values.T.tolist(), first, strict=True):
-            changes = dict(zip(keys, numbers, strict=True))
-            tables = {field: _copied(self._tables[field])}
-            override_all(tables, changes)
-            try:
-                one = adapter.validate_python(tables[field])
-            except ValidationError:
-                # Said once more by the whole scenario, whose message names the key.
-                _overridden(self.scenario, changes, f"flight {self.flights[flight]}")
-                raise
-            made.append(one[int(index)] if index else one)
-        return made, inverse.reshape(-1)
-
-
-def _copied(tables: Any) -> Any:
-    if isinstance(tables, dict):
-        return {key: _copied(value) for key, value in tables.items()}
-    return [_copied(value) for value in tables] if isinstance(tables, list) else tables
-
-
-def _overridden(scenario: Scenario, changes: Mapping[str, Any], where: str) -> Scenario:
-    tables = scenario.as_tables()
-    override_all(tables, changes)
-    return scenario_from(tables, where)
 
 
 def _seeds(scenario: Scenario, columns: Columns, count: int) -> NDArray[np.int64]:
@@ -225,20 +104,22 @@ def _seeds(scenario: Scenario, columns: Columns, count: int) -> NDArray[np.int64
 def _is_numeric(scenario: Scenario, tables: dict[str, Any], key: str, column: NDArray[Any]) -> bool:
     """Whether a key of the scenario holds a float that may be one of the batch's numbers.
 
-    It is part of the loop where nobody knows better: in parts from outside the package, and the age of a truth that
-    is told late, which acts in the loop itself. (So are an allocator's numbers, whose part is not in `_NUMERIC`.)
+    Of parts from outside the package nobody knows whether they keep the rule that every float is a parameter
+    (`rotorfault.check_block` tells): there, a float is part of the loop.
     """
     first, _, rest = key.partition(".")
-    if first not in _NUMERIC or not np.issubdtype(column.dtype, np.number):
+    if not np.issubdtype(column.dtype, np.number):
         return False
-    here = getattr(scenario, first)
-    part = here[int(rest.partition(".")[0])] if first == "fault" else here
-    if isinstance(part, Part):
-        made = part.make()
-        if not type(made).__module__.startswith("rotorfault."):
+    if first in SLOTS:
+        slot = SLOTS[first]
+        if slot.side == "task":
             return False
-        if first == "diagnosis" and rest == "delay" and made.oracle_delay is not None:
+        value = getattr(scenario, first)
+        part = value[int(rest.partition(".")[0])] if slot.many else value
+        if not isinstance(part, Part) or not is_own(type(part.make()).__module__):
             return False
+    elif first not in _TABLES:
+        return False
     return isinstance(_value_at(tables, key), float)
 
 

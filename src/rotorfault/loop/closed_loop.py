@@ -1,38 +1,52 @@
 """The closed loop, one sampling period: the only place where truth and belief meet.
 
-    state       = plant.blown(state, normal numbers)
+    memories    = wind, faults brought to this period
     truth       = plant.observe(state)
-    measurement = sensors(truth)
-    command     = autopilot(measurement, reference)
+    readings    = sensors(truth)
+    command     = autopilot(readings, reference)
     scores      = scoring(scores, signals of this instant)
     state       = plant.step(state, command held for one period)
 
-Time is the counted step times the period, never a sum of periods: a fault at 1.8 s falls on its step exactly.
+A loop is an ordered mapping from slots to parts. Time is the counted step times the period, never a sum of periods: a
+fault at 1.8 s falls on its step exactly.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, final
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar, cast, final
 
-from rotorfault.autopilot.autopilot import Autopilot, AutopilotMemory, AutopilotParameters, AutopilotReport
-from rotorfault.loop.scoring import Scores, Scoring, ScoringParameters, unjudged
+from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
+from rotorfault.autopilot.response.land import Land
+from rotorfault.loop.recorded import Recorder
+from rotorfault.loop.scores import Scores, ScoringParameters, unjudged
+from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Command, Measurement, Reference
-from rotorfault.model.telemetry import Signals
-from rotorfault.model.vehicle import hover_thrust
-from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
-from rotorfault.plant.rotors import true_loss
-from rotorfault.plant.sensors import Normals, Sensors, no_noise
-from rotorfault.plant.wind import FirstNormals, no_first_normals
+from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.signals import Command, Reference
+from rotorfault.model.slot import Slot
+from rotorfault.model.telemetry import example
+from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.plant.faults import FAULT
+from rotorfault.plant.ground import GROUND
+from rotorfault.plant.models import PLANT
+from rotorfault.plant.plant import Held, Plant, PlantParameters, PlantState, Truth
+from rotorfault.plant.sensors import SENSORS, SensorInputs
+from rotorfault.plant.timed import TimeInputs
+from rotorfault.plant.wind import WIND, Air
+
+B = TypeVar("B")
+Parts = Mapping[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]
 
 
 class LoopParameters(NamedTuple):
     """All numbers of a closed loop."""
 
-    plant: PlantParameters
-    autopilot: AutopilotParameters
-    sensors: Any
+    vehicle: Vehicle  # the true one
+    belief: Vehicle
+    parts: Any  # record of the parts' numbers, by slot
     period: Scalar  # s
     scoring: ScoringParameters = unjudged()
 
@@ -41,7 +55,7 @@ class LoopState(NamedTuple):
     """State of truth and belief, what has been counted, and the number of steps flown."""
 
     plant: PlantState
-    late: tuple[Measurement, ...]  # measurements on their way to the autopilot, the oldest first
+    truth: Any  # record of the memories of the truth's parts, by slot
     autopilot: AutopilotMemory
     scores: Scores
     steps: Scalar
@@ -51,8 +65,8 @@ class Drive(NamedTuple):
     """What enters from outside at each step."""
 
     reference: Reference
-    noise: Normals
-    gust: Vec3 = zeros()  # three independent standard normal numbers, for the memory of the wind
+    own: Any = ()  # signals of the reference's own
+    normals: Any = ()  # record of standard normal numbers for the parts that need some, by slot
 
 
 class Start(NamedTuple):
@@ -62,138 +76,240 @@ class Start(NamedTuple):
     v_W: Vec3  # m/s
     attitude: Vec3  # rad
     omega_B: Vec3  # rad/s
-    gust: FirstNormals = no_first_normals()  # how the memory of the wind starts
+    normals: Any = ()  # record of standard normal numbers for `initial` of the parts that need some, by slot
 
 
 @final
 class ClosedLoop:
-    """Plant, sensors and autopilot, and the scores of their flight.
+    """Parts of truth and belief put together, and the scores of their flight.
 
     Parameters
     ----------
-    plant : Plant
-    sensors : Sensors
-    autopilot : Autopilot
+    parts : mapping of Slot to Block, or to a tuple of them
+        In the order of the slots.
+    substeps : int
+        Integration steps per sampling period, at least 1.
+    reference : type of NamedTuple
+        Signals of the reference's own.
+
+    Attributes
+    ----------
+    layout : Layout
+        Names, units and rows of what is recorded.
     """
 
-    def __init__(self, plant: Plant, sensors: Sensors, autopilot: Autopilot) -> None:
-        self.plant, self.sensors, self.autopilot = plant, sensors, autopilot
-        self.scoring = Scoring(ground=plant.ground is not None)
+    def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing) -> None:
+        self.parts = dict(parts)
+        truth = {slot: part for slot, part in self.parts.items() if slot.side == "truth"}
+        self.autopilot = Autopilot(
+            {slot: cast("AnyBlock", part) for slot, part in self.parts.items() if slot.side == "belief"}
+        )
+        self.plant = Plant(self[PLANT], self[WIND], self.all(FAULT), substeps, self.maybe(GROUND))
+        self.sensors = self[SENSORS]
+        self._names = tuple(slot.name for slot in truth)
+        self._memories = record_type("TruthParts", self._names)
+        self.record = record_type("Parts", tuple(slot.name for slot in self.parts))
+        self.reference = reference
+        telemetry = {"reference": reference}
+        for slot, part in self.parts.items():
+            if isinstance(part, tuple):
+                telemetry |= {f"{slot.name}_{number}": one.Telemetry for number, one in enumerate(part)}
+            else:
+                telemetry[slot.name] = part.Telemetry
+        lands = any(isinstance(part, Land) for part in self.parts.values())
+        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry)
+        self.layout = self.recorder.layout
+        self.scoring = Scoring(
+            ground=self.plant.ground is not None,
+            lands=lands,
+            faulty=tuple(fault.rotor for fault in self.plant.faults),
+            signals=self.layout.signals,
+        )
+
+    def __getitem__(self, slot: Slot[B]) -> B:
+        """The part of a slot that has one."""
+        return cast("B", self.parts[slot])
+
+    def all(self, slot: Slot[B]) -> tuple[B, ...]:
+        """The parts of a slot that has many."""
+        return cast("tuple[B, ...]", self.parts.get(slot, ()))
+
+    def maybe(self, slot: Slot[B]) -> B | None:
+        """The part of a slot that may be empty."""
+        return cast("B | None", self.parts.get(slot))
+
+    def each(self) -> Iterator[tuple[Slot[Any], AnyBlock]]:
+        """Every part with its slot."""
+        for slot, part in self.parts.items():
+            for one in part if isinstance(part, tuple) else (part,):
+                yield slot, one
+
+    def numbers(self, vehicle: Vehicle, belief: Vehicle, period: float) -> Any:
+        """Record of the numbers of all parts, by slot.
+
+        Parameters
+        ----------
+        vehicle, belief : Vehicle
+            The true one, and what the autopilot believes.
+        period : float, s
+            Sampling period.
+        """
+        contexts = {"truth": Context(vehicle, period), "belief": Context(belief, period)}
+        return self.record(
+            *(
+                tuple(one.parameters(contexts[slot.side]) for one in part)
+                if isinstance(part, tuple)
+                else part.parameters(contexts[slot.side])
+                for slot, part in self.parts.items()
+            )
+        )
+
+    def drive(self) -> Drive:
+        """A drive without normal numbers; its own numbers have no meaning."""
+        own = () if self.reference is Nothing else example(self.reference)
+        return Drive(no_reference(), own=own)
 
     def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
+        numbers, plant_numbers = parameters.parts, self._plant_numbers(parameters)
         plant = self.plant.initial(
-            start.p_W,
-            start.v_W,
-            start.attitude,
-            start.omega_B,
-            hover_thrust(parameters.autopilot.vehicle),
-            parameters.plant,
-            self.plant.wind.initial(start.gust, parameters.plant.wind, parameters.period),
+            start.p_W, start.v_W, start.attitude, start.omega_B, hover_thrust(parameters.belief), plant_numbers
         )
-        truth = self.plant.observe(plant, 0.0, parameters.plant)
-        measurement = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
-        autopilot = self.autopilot.initial(measurement, drive.reference, parameters.autopilot)
-        late = (measurement,) * self.sensors.delay
-        return LoopState(plant, late, autopilot, self.scoring.initial(), 0.0)
+        at_start = TimeInputs(0.0, _normals(start.normals, "wind"))
+        held = Held(
+            self.plant.wind.initial(at_start, numbers.wind),
+            tuple(
+                fault.initial(TimeInputs(0.0), one)
+                for fault, one in zip(self.plant.faults, self._faults(numbers), strict=True)
+            ),
+        )
+        air = self.plant.wind.at(0.0, held.wind, numbers.wind)
+        truth = self.plant.observe(plant, held, air, 0.0, plant_numbers)
+        inputs = _sensed(truth, 0.0, _normals(start.normals, "sensors"))
+        sensors = self.sensors.initial(inputs, numbers.sensors)
+        readings = self.sensors.step(sensors, inputs, numbers.sensors, parameters.period)[1]
+        autopilot = self.autopilot.initial(readings, drive.reference, parameters.belief, numbers, parameters.period)
+        return LoopState(plant, self._kept(held, sensors), autopilot, self.scoring.initial(), 0.0)
 
-    def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Signals]:
+    def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Record]:
         """One sampling period: the state after it, and the signals at its beginning."""
         after, command, recorded = self.decide(state, drive, parameters)
         time = state.steps * parameters.period
-        plant = self.plant.step(after.plant, command, time, parameters.plant, parameters.period)
+        plant = self.plant.step(
+            after.plant, command, self.held(after), time, self._plant_numbers(parameters), parameters.period
+        )
         return after._replace(plant=plant), recorded
 
-    def decide(
-        self, state: LoopState, drive: Drive, parameters: LoopParameters
-    ) -> tuple[LoopState, Command, Signals]:
+    def decide(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Command, Record]:
         """The sampling instant alone.
 
         Returns
         -------
         state : LoopState
-            All that is held from it on; the wind is that of the period that begins, and nothing has moved.
+            All that is held from it on; wind and faults are those of the period that begins, nothing has moved.
         command : Command
             The autopilot's, not yet put within the rotor limits.
-        recorded : Signals
+        recorded : record
+            The signals of this instant, in the order of `layout`.
         """
-        time = state.steps * parameters.period
-        plant = self.plant.blown(state.plant, drive.gust, parameters.plant, parameters.period)
-        truth = self.plant.observe(plant, time, parameters.plant)
-        fresh = self.sensors.sense(truth.measurement, drive.noise, parameters.sensors)
-        measurement, *late = (*state.late, fresh)
+        time, dt, numbers = state.steps * parameters.period, parameters.period, parameters.parts
+        telemetry: dict[str, Record] = {"reference": drive.own}
+        held, air = self._blown(state, drive, parameters, telemetry)
+        plant_numbers = self._plant_numbers(parameters)
+        truth = self.plant.observe(state.plant, held, air, time, plant_numbers)
+        sensors, readings, telemetry["sensors"] = self.sensors.step(
+            state.truth.sensors, _sensed(truth, time, _normals(drive.normals, "sensors")), numbers.sensors, dt
+        )
         memory, command, report = self.autopilot.step(
             state.autopilot,
-            measurement,
+            readings,
             drive.reference,
-            self._told(plant, time, parameters.plant),
-            parameters.autopilot,
-            parameters.period,
+            parameters.belief,
+            numbers,
+            dt,
+            self._told(state.plant, held, time, parameters),
         )
-        recorded = signals(truth, command, report)
-        scores = self.scoring.step(state.scores, recorded, parameters.scoring, state.steps, parameters.period)
-        return LoopState(plant, tuple(late), memory, scores, state.steps + 1.0), command, recorded
+        recorded = self.recorder.record(truth, command, report, telemetry | report.telemetry)
+        scores = self.scoring.step(
+            state.scores, recorded, parameters.scoring, self.onsets(numbers), state.steps, time, dt
+        )
+        after = LoopState(state.plant, self._kept(held, sensors), memory, scores, state.steps + 1.0)
+        return after, command, recorded
 
-    def _told(self, plant: PlantState, time: Scalar, parameters: PlantParameters) -> PerRotor:
-        """The true losses, for a diagnosis source that is an oracle; nothing for any other."""
-        delay = self.autopilot.diagnoser.oracle_delay
-        if delay is None:
-            return PerRotor.all(0.0)
-        return true_loss(parameters.vehicle, plant.rotors, self.plant.fault(time - delay, parameters))
+    def limited(self, command: Command, parameters: LoopParameters) -> Command:
+        """The command within the true rotor limits."""
+        return self.plant.limited(command, self._plant_numbers(parameters))
+
+    def substep(
+        self, state: LoopState, command: Command, time: Scalar, parameters: LoopParameters, dt: Scalar
+    ) -> LoopState:
+        """State one integration step of dt [s] later, after `decide`, the command (within the limits) held."""
+        numbers = self._plant_numbers(parameters)
+        return state._replace(plant=self.plant.substep(state.plant, command, self.held(state), time, numbers, dt))
+
+    def held(self, state: LoopState) -> Held:
+        """Memories of wind and faults over the period that begins, after `decide`."""
+        return Held(state.truth.wind, state.truth.fault if self.plant.faults else ())
+
+    def _blown(
+        self, state: LoopState, drive: Drive, parameters: LoopParameters, telemetry: dict[str, Record]
+    ) -> tuple[Held, Air]:
+        """Wind and faults brought to the period that begins."""
+        time, dt, numbers = state.steps * parameters.period, parameters.period, parameters.parts
+        before = self.held(state)
+        wind, air, telemetry["wind"] = self.plant.wind.step(
+            before.wind, TimeInputs(time, _normals(drive.normals, "wind")), numbers.wind, dt
+        )
+        faults = []
+        each = zip(self.plant.faults, before.faults, self._faults(numbers), strict=True)
+        for number, (fault, memory, one) in enumerate(each):
+            memory, _, telemetry[f"fault_{number}"] = fault.step(memory, TimeInputs(time), one, dt)
+            faults.append(memory)
+        return Held(wind, tuple(faults)), air
+
+    def _told(self, plant: PlantState, held: Held, time: Scalar, parameters: LoopParameters) -> PerRotor | None:
+        """The true losses, for a source of diagnosis that is an oracle; nothing for any other."""
+        oracle = self.autopilot.oracle
+        if oracle is None:
+            return None
+        age = oracle.age(parameters.parts.diagnosis)
+        return self.plant.true_loss(plant, held, time - age, self._plant_numbers(parameters))
+
+    def onsets(self, numbers: Any) -> tuple[Scalar, ...]:
+        """Time of the first effect of each fault in s."""
+        return tuple(fault.onset(one) for fault, one in zip(self.plant.faults, self._faults(numbers), strict=True))
+
+    def _faults(self, numbers: Any) -> tuple[Any, ...]:
+        return cast("tuple[Any, ...]", numbers.fault) if self.plant.faults else ()
+
+    def _plant_numbers(self, parameters: LoopParameters) -> PlantParameters:
+        numbers = parameters.parts
+        return PlantParameters(
+            parameters.vehicle,
+            numbers.wind,
+            self._faults(numbers),
+            () if self.plant.ground is None else numbers.ground,
+        )
+
+    def _kept(self, held: Held, sensors: Any) -> Any:
+        """Memories of the truth's parts by slot; the body and the ground have none of their own."""
+        own = {"wind": held.wind, "fault": held.faults, "sensors": sensors}
+        return self._memories(*(own.get(name, ()) for name in self._names))
 
 
-def signals(truth: Truth, command: Command, report: AutopilotReport) -> Signals:
-    """What is recorded of one sampling instant."""
-    seen, told, law = truth.measurement, report.diagnosis, report.control
-    left, reference = report.allocation.unallocated, report.reference
-    return Signals(
-        position=seen.p_W,
-        velocity=seen.v_W,
-        attitude=seen.attitude,
-        body_rates=seen.omega_B,
-        position_reference=reference.p_W,
-        velocity_reference=reference.v_W,
-        acceleration_reference=reference.a_W,
-        yaw_reference=reference.yaw,
-        attitude_demand=law.attitude_demand,
-        attitude_command=law.attitude_command,
-        wind=truth.air.velocity_W,
-        disturbance=truth.air.acceleration_W,
-        thrust_command=command.thrust,
-        thrust=truth.thrust,
-        expected_thrust=report.expected_thrust,
-        rotor_speed=truth.rotor_speed,
-        loss_true=truth.loss,
-        loss_estimated=told.estimate,
-        loss_believed=told.loss,
-        fault_flag=told.flagged,
-        thrust_residual=told.residual,
-        thrust_demand=report.wrench.thrust,
-        torque_demand=report.wrench.torque_B,
-        thrust_unallocated=left.thrust,
-        torque_unallocated=left.torque_B,
-        given_up=report.allocation.given_up,
-        virtual_position=law.virtual_position_W,
-        virtual_attitude=law.virtual_attitude,
-        sigma_position=law.sigma_position,
-        sigma_attitude=law.sigma_attitude,
-        outside_layer_position=law.outside_position,
-        outside_layer_attitude=law.outside_attitude,
-        lyapunov=law.lyapunov,
-        gain_position=law.gain_position,
-        gain_velocity=law.gain_velocity,
-        gain_angle=law.gain_angle,
-        gain_rate=law.gain_rate,
-        riccati_residual=law.riccati_residual,
-        riccati_guarded=law.riccati_guarded,
-        ground_force=truth.ground_force,
-        landing_stage=report.stage,
-    )
+def _sensed(truth: Truth, time: Scalar, normals: tuple[Scalar, ...]) -> SensorInputs:
+    return SensorInputs(time, truth.state, truth.specific_force_B, normals)
 
 
-def quiet(reference: Reference) -> Drive:
-    """A drive without noise."""
-    return Drive(reference, no_noise())
+def _normals(normals: Any, slot: str) -> tuple[Scalar, ...]:
+    """Normal numbers of a slot; zeros are not made up: a part that needs some and gets none fails at once."""
+    return cast("tuple[Scalar, ...]", getattr(normals, slot, ()))
+
+
+def no_reference() -> Reference:
+    """The origin, at rest."""
+    zero = zeros()
+    return Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
 
 
 def level_start(p_W: Vec3) -> Start:

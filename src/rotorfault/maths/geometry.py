@@ -1,13 +1,10 @@
-"""Value types with operators, and rotations.
+"""Value types with operators.
 
-`Vec3`, `Mat3`, `Quat` hold scalars of any kind (see `rotorfault.maths.scalar`), so equations read as in a paper:
+`Vec3` and `Mat3` hold scalars of any kind (see `rotorfault.maths.scalar`), so equations read as in a paper:
 ``thrust_W / mass + g_W``, ``omega.cross(J @ omega)``, ``Y.T @ Y``. `PerRotor` holds one scalar per rotor, in the
 order rotor 1, 2, 3, 4, and works elementwise.
 
-Conventions: the world frame W has x forward, y left, z up; the body frame B is the same at zero attitude. A
-rotation matrix ``R_WB`` takes body coordinates to world coordinates. Quaternions are Hamilton's, scalar first
-(w, x, y, z), body to world; this file is the only place that knows the order. Euler angles are (roll, pitch, yaw)
-with ``R_WB = Rz(yaw) Ry(pitch) Rx(roll)``, so positive pitch is nose down.
+Rotations are in `rotorfault.maths.rotation`.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, overload
 
-from rotorfault.maths.scalar import Scalar, atan2, cos, reciprocal, sin, sqrt
+from rotorfault.maths.scalar import Scalar, reciprocal, sqrt
 
 
 class Value:
@@ -92,6 +89,10 @@ class Vec3(Value):
             self.z * other.x - self.x * other.z,
             self.x * other.y - self.y * other.x,
         )
+
+    def sum(self) -> Scalar:
+        """Sum of the components."""
+        return self.x + self.y + self.z
 
     def norm(self) -> Scalar:
         """Euclidean length."""
@@ -291,104 +292,6 @@ class PerRotor(Value):
     def reduce(self, function: Callable[[Scalar, Scalar], Scalar]) -> Scalar:
         """Fold the four values with a function of two, such as `rotorfault.maths.scalar.minimum`."""
         return function(function(self.r1, self.r2), function(self.r3, self.r4))
-
-
-class Quat(Value):
-    """A Hamilton quaternion (w, x, y, z); as an attitude q_WB it rotates body coordinates into the world."""
-
-    __slots__ = ("w", "x", "y", "z")
-
-    def __init__(self, w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> None:
-        self.w, self.x, self.y, self.z = w, x, y, z
-
-    @classmethod
-    def identity(cls) -> Quat:
-        """The zero rotation."""
-        return cls(1.0, 0.0, 0.0, 0.0)
-
-    @classmethod
-    def from_euler(cls, euler: Vec3) -> Quat:
-        """Quaternion of Euler angles (roll, pitch, yaw) in rad."""
-        half = euler * 0.5
-        cr, cp, cy = half.map(cos)
-        sr, sp, sy = half.map(sin)
-        return cls(
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        )
-
-    def __add__(self, other: Quat) -> Quat:
-        return Quat(self.w + other.w, self.x + other.x, self.y + other.y, self.z + other.z)
-
-    def __mul__(self, factor: Scalar) -> Quat:
-        return Quat(self.w * factor, self.x * factor, self.y * factor, self.z * factor)
-
-    __rmul__ = __mul__
-
-    def __matmul__(self, other: Quat) -> Quat:
-        """Hamilton product: first `other`, then `self`."""
-        a, b = self, other
-        return Quat(
-            a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
-            a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-            a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-            a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
-        )
-
-    def conjugate(self) -> Quat:
-        """The inverse rotation, for a unit quaternion."""
-        return Quat(self.w, -self.x, -self.y, -self.z)
-
-    def dot(self, other: Quat) -> Scalar:
-        """Scalar product of the four components."""
-        return self.w * other.w + self.x * other.x + self.y * other.y + self.z * other.z
-
-    def normalised(self) -> Quat:
-        """The unit quaternion along this one."""
-        unit: Quat = self * (1.0 / sqrt(self.dot(self)))
-        return unit
-
-    def derivative(self, omega_B: Vec3) -> Quat:
-        """Time derivative q_dot = q (0, omega_B) / 2 for body rates in rad/s."""
-        return (self @ Quat(0.0, omega_B.x, omega_B.y, omega_B.z)) * 0.5
-
-    def matrix(self) -> Mat3:
-        """Rotation matrix R_WB of a unit quaternion."""
-        w, x, y, z = self.w, self.x, self.y, self.z
-        return Mat3(
-            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-            2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
-        )  # fmt: skip
-
-    def euler(self) -> Vec3:
-        """Euler angles (roll, pitch, yaw) in rad; pitch in [-pi/2, pi/2], where it is singular at the ends."""
-        R = self.matrix()
-        return Vec3(atan2(R.zy, R.zz), atan2(-R.zx, sqrt(R.xx * R.xx + R.yx * R.yx)), atan2(R.yx, R.xx))
-
-
-def euler_matrix(euler: Vec3) -> Mat3:
-    """Rotation matrix R_WB = Rz(yaw) Ry(pitch) Rx(roll) of Euler angles in rad."""
-    c_roll, c_pitch, c_yaw = euler.map(cos)
-    s_roll, s_pitch, s_yaw = euler.map(sin)
-    return Mat3(
-        c_yaw * c_pitch, c_yaw * s_pitch * s_roll - s_yaw * c_roll, c_yaw * s_pitch * c_roll + s_yaw * s_roll,
-        s_yaw * c_pitch, s_yaw * s_pitch * s_roll + c_yaw * c_roll, s_yaw * s_pitch * c_roll - c_yaw * s_roll,
-        -s_pitch, c_pitch * s_roll, c_pitch * c_roll,
-    )  # fmt: skip
-
-
-def body_z_axis(euler: Vec3) -> Vec3:
-    """The thrust axis R_WB e_z in world coordinates: the third column of `euler_matrix`, as in (3)."""
-    c_roll, c_pitch, c_yaw = euler.map(cos)
-    s_roll, s_pitch, s_yaw = euler.map(sin)
-    return Vec3(
-        c_roll * s_pitch * c_yaw + s_roll * s_yaw,
-        c_roll * s_pitch * s_yaw - s_roll * c_yaw,
-        c_roll * c_pitch,
-    )
 
 
 def zeros() -> Vec3:

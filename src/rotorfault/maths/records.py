@@ -9,7 +9,9 @@ A NamedTuple's ``+`` concatenates: records carry data, value types carry algebra
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from rotorfault.maths.geometry import Value
@@ -92,3 +94,17 @@ def select_record(condition: Scalar, a: R, b: R) -> R:
 
 def _select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     return a if a is b else select(condition, a, b)
+
+
+@lru_cache(maxsize=256)
+def record_type(name: str, fields: tuple[str, ...]) -> Any:
+    """A type of record whose fields are known only when a flight is put together, such as the parts of its loop.
+
+    Parameters
+    ----------
+    name : str
+        Of the type, for messages.
+    fields : tuple of str
+        Names of its fields, in order.
+    """
+    return namedtuple(name, fields)  # type: ignore[misc]

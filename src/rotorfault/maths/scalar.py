@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterable
 from functools import partial
 from types import ModuleType
 from typing import Any, TypeAlias
@@ -318,6 +319,14 @@ def both(a: Scalar, b: Scalar) -> Scalar:
 def either(a: Scalar, b: Scalar) -> Scalar:
     """Logical or of two conditions."""
     return 1.0 - (1.0 - a) * (1.0 - b)
+
+
+def any_of(conditions: Iterable[Scalar]) -> Scalar:
+    """Logical or of some conditions, 0 of none."""
+    first, *others = (*conditions,) or (0.0,)
+    for condition in others:
+        first = either(first, condition)
+    return first
 
 
 def negated(a: Scalar) -> Scalar:

@@ -1,14 +1,18 @@
 """What flows between the parts of the closed loop: records with named fields, SI units and radians.
 
-Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Thrusts are in newton per rotor.
+Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Attitude flows as a unit quaternion ``q_WB``
+(body to world); angles are for people. Thrusts are in newton per rotor.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
-from rotorfault.maths.geometry import PerRotor, Vec3, body_z_axis, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
+
+T = TypeVar("T")
 
 
 class Wrench(NamedTuple):
@@ -21,26 +25,59 @@ class Wrench(NamedTuple):
     torque_B: Vec3  # N m: roll, pitch, yaw
 
 
-class Measurement(NamedTuple):
-    """What the autopilot sees of the vehicle at a sampling instant."""
+class State(NamedTuple):
+    """The true motion of the body at one time."""
 
     p_W: Vec3  # m
     v_W: Vec3  # m/s
-    attitude: Vec3  # rad: roll, pitch, yaw
+    q_WB: Quat  # unit quaternion, body to world
     omega_B: Vec3  # rad/s; Euler rates where the plant is `paper_model`, which identifies the two
 
 
+class Reading(NamedTuple, Generic[T]):
+    """What one sensor gives at a sampling instant."""
+
+    value: T
+    valid: Scalar = 1.0  # 1 where there is a value, else 0
+    age: Scalar = 0.0  # s since it was measured
+
+
+Absent = tuple[()]
+"""Stands for a reading that a set of sensors has not got; it has no numbers."""
+
+
+class Readings(NamedTuple):
+    """What the sensors give at one sampling instant; a set of sensors may lack any of it."""
+
+    position: Reading[Vec3] | Absent = ()  # m, W
+    velocity: Reading[Vec3] | Absent = ()  # m/s, W
+    attitude: Reading[Quat] | Absent = ()  # q_WB
+    rates: Reading[Vec3] | Absent = ()  # rad/s, B
+    specific_force: Reading[Vec3] | Absent = ()  # m/s^2, B: acceleration less gravity, at the centre of mass
+
+
+class Estimate(NamedTuple):
+    """What the estimator believes at one sampling instant."""
+
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    q_WB: Quat  # unit quaternion, body to world
+    omega_B: Vec3  # rad/s
+    specific_force_B: Vec3 = zeros()  # m/s^2: acceleration less gravity
+    wind_W: Vec3 | Absent = ()  # m/s, of the air over ground, where the estimator knows it
+
+
 class Motion(NamedTuple):
-    """What predictions need of a measurement; kept from one sampling instant to the next."""
+    """What predictions need of an estimate; kept from one sampling instant to the next."""
 
     v_W: Vec3  # m/s
     omega_B: Vec3  # rad/s
     axis_W: Vec3  # unit vector of the thrust
 
 
-def motion_of(measurement: Measurement) -> Motion:
-    """The motion that is measured."""
-    return Motion(measurement.v_W, measurement.omega_B, body_z_axis(measurement.attitude))
+def motion_of(estimate: Estimate) -> Motion:
+    """The motion that is believed."""
+    return Motion(estimate.v_W, estimate.omega_B, estimate.q_WB.z_axis())
 
 
 class Reference(NamedTuple):
@@ -79,12 +116,13 @@ class Allocation(NamedTuple):
     given_up: Vec3  # indicators 1/0: (tilt torque cut, thrust cut, yaw torque cut)
 
 
-def no_wrench() -> Wrench:
-    """The zero wrench."""
-    return Wrench(0.0, zeros())
-
-
 def healthy() -> Diagnosis:
     """The belief that every rotor is sound."""
     none = PerRotor.all(0.0)
     return Diagnosis(loss=none, flagged=none, estimate=none, residual=none)
+
+
+def at_rest() -> Estimate:
+    """At the origin, level and still; a hovering vehicle feels its weight."""
+    zero = zeros()
+    return Estimate(zero, zero, Quat.identity(), zero)

@@ -1,94 +1,143 @@
-"""What is recorded of a flight: the signals of one sampling instant, with unit, frame and meaning.
+"""Signals with unit, frame and meaning: how a part names what it records, and how records become rows and back.
 
-The record `Signals` is filled by the closed loop and flattened by the engines; its annotations are the one place
-that knows units and frames, and end up in the attributes of ``flight.nc``.
+A part's telemetry is a NamedTuple whose fields are annotated:
+
+    class PdTelemetry(NamedTuple):
+        error: Annotated[Vec3, Quantity("m", WORLD, "position less reference")]
+
+It is recorded as ``SLOT.error``, in files, figures and tables alike; nobody else records zeros for it. A quantity may
+also be counted over the whole flight (`Quantity.score`).
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple, final, get_args, get_type_hints
 
+from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.records import leaf_names
+from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
 
-W, B = "world: x forward, y left, z up", "body: x forward, y left, z up"
-RPY = "roll, pitch, yaw of body in world"
+WORLD, BODY = "world: x forward, y left, z up", "body: x forward, y left, z up"
+ANGLES = "roll, pitch, yaw of body in world"
 NO_FRAME = ""
+
+Score = Literal["largest", "fraction"]
 
 
 class Quantity(NamedTuple):
-    """Unit, frame and meaning of a signal."""
+    """Unit, frame and meaning of a signal, and what is counted of it over a flight."""
 
     unit: str
     frame: str
     meaning: str
+    score: Score | None = None  # its largest value, or the share of sampling instants at which it is above 0.5
 
 
 Q = Quantity
+W, B, RPY = WORLD, BODY, ANGLES
+
+KINDS: dict[Any, Any] = {
+    Scalar: 0.0,
+    Vec3: Vec3(0.0, 0.0, 0.0),
+    Quat: Quat.identity(),
+    PerRotor: PerRotor.all(0.0),
+    Mat3: Mat3.identity(),
+}
+"""Types that a signal may have, each with a value of its shape."""
 
 
-class Signals(NamedTuple):
-    """One sampling instant of the closed loop: truth, belief, decisions."""
+class Signal(NamedTuple):
+    """One recorded signal."""
 
-    position: Annotated[Vec3, Q("m", W, "true position")]
-    velocity: Annotated[Vec3, Q("m/s", W, "true velocity")]
-    attitude: Annotated[Vec3, Q("rad", RPY, "true attitude")]
-    body_rates: Annotated[Vec3, Q("rad/s", B, "true body rates (Euler rates on paper_model)")]
-    position_reference: Annotated[Vec3, Q("m", W, "where the vehicle shall be: of the scenario, or of a landing")]
-    velocity_reference: Annotated[Vec3, Q("m/s", W, "its derivative")]
-    acceleration_reference: Annotated[Vec3, Q("m/s^2", W, "acceleration fed forward")]
-    yaw_reference: Annotated[Scalar, Q("rad", RPY, "yaw that the vehicle shall have")]
-    attitude_demand: Annotated[Vec3, Q("rad", RPY, "attitude that the position loop asks for")]
-    attitude_command: Annotated[Vec3, Q("rad", RPY, "demand after the command filter")]
-    wind: Annotated[Vec3, Q("m/s", W, "true velocity of the air")]
-    disturbance: Annotated[Vec3, Q("m/s^2", W, "true disturbance acceleration that acts directly")]
-    thrust_command: Annotated[PerRotor, Q("N", NO_FRAME, "commanded thrust")]
-    thrust: Annotated[PerRotor, Q("N", NO_FRAME, "true thrust")]
-    expected_thrust: Annotated[PerRotor, Q("N", NO_FRAME, "thrust of sound rotors as believed")]
-    rotor_speed: Annotated[PerRotor, Q("rad/s", NO_FRAME, "true rotor speed, without sign")]
-    loss_true: Annotated[PerRotor, Q("1", NO_FRAME, "true loss of effectiveness")]
-    loss_estimated: Annotated[PerRotor, Q("1", NO_FRAME, "estimated loss before any decision")]
-    loss_believed: Annotated[PerRotor, Q("1", NO_FRAME, "smoothed loss of flagged rotors; acted upon")]
-    fault_flag: Annotated[PerRotor, Q("1", NO_FRAME, "1 where a fault is declared")]
-    thrust_residual: Annotated[PerRotor, Q("N", NO_FRAME, "estimated thrust less that of a sound rotor")]
-    thrust_demand: Annotated[Scalar, Q("N", B, "demanded total thrust")]
-    torque_demand: Annotated[Vec3, Q("N m", B, "demanded torque")]
-    thrust_unallocated: Annotated[Scalar, Q("N", B, "demanded less given thrust, as believed")]
-    torque_unallocated: Annotated[Vec3, Q("N m", B, "demanded less given torque, as believed")]
-    given_up: Annotated[Vec3, Q("1", NO_FRAME, "1 where tilt torque, thrust, yaw torque (x, y, z) was cut")]
-    virtual_position: Annotated[Vec3, Q("m/s^2", W, "commanded acceleration less gravity and feed-forward, limited")]
-    virtual_attitude: Annotated[Vec3, Q("rad/s^2", RPY, "commanded angular acceleration less feed-forward")]
-    sigma_position: Annotated[Vec3, Q("m/s", W, "sliding variable, times its weight")]
-    sigma_attitude: Annotated[Vec3, Q("rad/s", RPY, "sliding variable, times its weight")]
-    outside_layer_position: Annotated[Vec3, Q("1", W, "1 on axes outside the boundary layer")]
-    outside_layer_attitude: Annotated[Vec3, Q("1", RPY, "1 on axes outside the boundary layer")]
-    lyapunov: Annotated[Scalar, Q("1", NO_FRAME, "V = sigma^T sigma / 2 over all six axes")]
-    gain_position: Annotated[Vec3, Q("1/s^2", W, "gain on the position error")]
-    gain_velocity: Annotated[Vec3, Q("1/s", W, "gain on the velocity error")]
-    gain_angle: Annotated[Mat3, Q("1/s^2", RPY, "gain matrix on the attitude error")]
-    gain_rate: Annotated[Mat3, Q("1/s", RPY, "gain matrix on the rate error")]
-    riccati_residual: Annotated[Scalar, Q("1", NO_FRAME, "relative residual of the attitude Riccati equation")]
-    riccati_guarded: Annotated[Scalar, Q("1", NO_FRAME, "1 where the guaranteed gain was flown")]
-    ground_force: Annotated[Scalar, Q("N", W, "true upward force of the ground")]
-    landing_stage: Annotated[Scalar, Q("1", NO_FRAME, "0 as the scenario wants, 1 descending, 2 rotors stopped")]
+    name: str  # dotted: "position", or "controller.sigma_position"
+    kind: Any  # one of `KINDS`
+    quantity: Quantity
 
 
-def _template() -> Any:
-    parts: dict[Any, Any] = {
-        Scalar: 0.0,
-        Vec3: Vec3(0.0, 0.0, 0.0),
-        PerRotor: PerRotor.all(0.0),
-        Mat3: Mat3.identity(),
-    }
-    return Signals(**{name: parts[kind] for name, (kind, _) in quantities().items()})
+@lru_cache(maxsize=256)
+def signals_of(telemetry: type[tuple[Any, ...]], prefix: str = "") -> tuple[Signal, ...]:
+    """Signals that a telemetry record has, in order.
+
+    Parameters
+    ----------
+    telemetry : type of NamedTuple
+    prefix : str
+        Name of the slot; empty for the loop's own.
+
+    Raises
+    ------
+    InputError
+        If a field is not annotated with a quantity, or its type is none of `KINDS`.
+    """
+    hints = get_type_hints(telemetry, include_extras=True)
+    signals = []
+    for name in getattr(telemetry, "_fields", ()):
+        kind, *notes = get_args(hints[name]) or (hints[name],)
+        quantity = next((note for note in notes if isinstance(note, Quantity)), None)
+        if quantity is None or kind not in KINDS:
+            allowed = ", ".join(getattr(one, "__name__", "Scalar") for one in KINDS if one is not Scalar)
+            raise InputError(
+                f"telemetry {telemetry.__name__}.{name}: allowed: Annotated[KIND, Quantity(unit, frame, meaning)] with "
+                f"KIND one of Scalar, {allowed}"
+            )
+        signals.append(Signal(f"{prefix}.{name}" if prefix else name, kind, quantity))
+    return tuple(signals)
 
 
-def quantities() -> dict[str, tuple[Any, Quantity]]:
-    """Type, and unit, frame and meaning, of every signal in order."""
-    hints = get_type_hints(Signals, include_extras=True)
-    return {name: (get_args(hint)[0], get_args(hint)[1]) for name, hint in hints.items()}
+def example(telemetry: type[tuple[Any, ...]]) -> Any:
+    """A record of this shape, its numbers without meaning."""
+    return telemetry(*(KINDS[signal.kind] for signal in signals_of(telemetry)))
 
 
-SIGNAL_NAMES = tuple(leaf_names(_template()))
-"""Dotted name of each row of a recording, such as ``position.x`` or ``thrust.r1``."""
+@final
+class Layout:
+    """The rows of a recording: which signals, in which order.
+
+    Parameters
+    ----------
+    signals : tuple of Signal
+        In the order in which the record of them is flattened.
+
+    Attributes
+    ----------
+    rows : tuple of str
+        Dotted name of each row, such as ``position.x`` or ``controller.gain_angle.xy``.
+    """
+
+    def __init__(self, signals: tuple[Signal, ...]) -> None:
+        self.signals = signals
+        self.rows = tuple(row for signal in signals for row in leaf_names(KINDS[signal.kind], signal.name))
+        self._starts: dict[str, slice] = {}
+        first = 0
+        for signal in signals:
+            width = len(leaf_names(KINDS[signal.kind]))
+            self._starts[signal.name] = slice(first, first + width)
+            first += width
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._starts
+
+    def place(self, name: str) -> slice:
+        """Rows of a signal."""
+        return self._starts[name]
+
+    def matching(self, name: str) -> list[int]:
+        """Rows of a signal, of one component of it (``position.z``), or of a part's signal without its slot."""
+        if name in self._starts:
+            place = self._starts[name]
+            return list(range(place.start, place.stop))
+        if name in self.rows:
+            return [self.rows.index(name)]
+        ends = [row for row, full in enumerate(self.rows) if full.partition(".")[2] == name]
+        return ends or [
+            row
+            for signal in self.signals
+            if signal.name.partition(".")[2] == name
+            for row in range(self._starts[signal.name].start, self._starts[signal.name].stop)
+        ]

@@ -26,8 +26,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
-from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle
 

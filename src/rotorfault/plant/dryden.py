@@ -46,7 +46,10 @@ from pydantic import Field
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, exp, maximum, sqrt
-from rotorfault.plant.wind import WINDS, Air, FirstNormals, Wind
+from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.slot import register
+from rotorfault.plant.timed import TimeInputs
+from rotorfault.plant.wind import Air, Wind
 
 FOOT = 0.3048  # m
 
@@ -62,6 +65,7 @@ class DrydenParameters(NamedTuple):
     sigma_up: Scalar  # m/s, of w
     length_level: Scalar  # m, of u and v
     length_up: Scalar  # m, of w
+    period: Scalar  # s
 
 
 class DrydenMemory(NamedTuple):
@@ -106,11 +110,12 @@ def _filter(length: Scalar, parameters: DrydenParameters, period: Scalar) -> _Fi
 
 
 @final
-@WINDS.register("dryden")
-class Dryden(Wind):
+@register("dryden")
+class Dryden(Wind[DrydenMemory, DrydenParameters]):
     """Steady wind with random gusts: Dryden model of MIL-F-8785C for low altitude."""
 
-    needs_noise: ClassVar[bool] = True
+    normals: ClassVar[int] = 3
+    first_normals: ClassVar[int | None] = 6
 
     class Settings(Strict):
         """Mean wind, and what the gusts' intensity and scale follow from; the defaults fit the paper's 3.6 m/s."""
@@ -131,10 +136,7 @@ class Dryden(Wind):
             1.0, ge=0.1, description="least speed with which the gusts are carried past the vehicle [m/s]"
         )
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> DrydenParameters:
+    def parameters(self, context: Context) -> DrydenParameters:
         """Mean wind, standard deviations and scale lengths."""
         s = self.settings
         x, y, _ = s.velocity_W
@@ -150,21 +152,24 @@ class Dryden(Wind):
             sigma_up=sigma_up,
             length_level=s.altitude / shape**1.2,
             length_up=s.altitude,
+            period=context.period,
         )
 
-    def initial(self, normals: FirstNormals, parameters: DrydenParameters, period: Scalar) -> DrydenMemory:
+    def initial(self, inputs: TimeInputs, parameters: DrydenParameters) -> DrydenMemory:
         """Memory in its stationary distribution."""
-        gust, other = normals
+        gust, other, period = Vec3.of(inputs.normals[:3]), Vec3.of(inputs.normals[3:]), parameters.period
         level = _filter(parameters.length_level, parameters, period)
         up = _filter(parameters.length_up, parameters, period)
         return DrydenMemory(gust, level.start(gust.y, other.y), up.start(gust.z, other.z))
 
-    def step(self, memory: DrydenMemory, normals: Vec3, parameters: DrydenParameters, period: Scalar) -> DrydenMemory:
-        """The gust of the next sampling period."""
-        n, (gust, across, above) = normals, memory
-        level = _filter(parameters.length_level, parameters, period)
-        up = _filter(parameters.length_up, parameters, period)
-        return DrydenMemory(
+    def step(
+        self, memory: DrydenMemory, inputs: TimeInputs, parameters: DrydenParameters, dt: Scalar
+    ) -> tuple[DrydenMemory, Air, Record]:
+        """The gust of the sampling period that begins."""
+        n, (gust, across, above) = Vec3.of(inputs.normals), memory
+        level = _filter(parameters.length_level, parameters, dt)
+        up = _filter(parameters.length_up, parameters, dt)
+        after = DrydenMemory(
             gust=Vec3(
                 level.first_order(gust.x, n.x),
                 level.second_order(gust.y, across, n.y),
@@ -173,6 +178,7 @@ class Dryden(Wind):
             across=level.first_order(across, n.y),
             up=up.first_order(above, n.z),
         )
+        return after, self.at(inputs.time, after, parameters), Nothing()
 
     def at(self, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Air:
         """Mean wind plus gust."""

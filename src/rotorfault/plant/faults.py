@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol, final
+from typing import Any, NamedTuple, final
 
 from pydantic import Field, model_validator
 
 from rotorfault.base.config import Strict, refusal
-from rotorfault.base.registry import Registry
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import (
     Scalar,
@@ -29,6 +28,9 @@ from rotorfault.maths.scalar import (
     select,
     wrap_angle,
 )
+from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT
+from rotorfault.model.slot import Slot, register
+from rotorfault.plant.timed import Timed
 
 # Times are counted steps times a period, and may fall short of the time that was meant by rounding.
 TIME_TOLERANCE = 1e-9  # s
@@ -42,39 +44,49 @@ class RotorFault(NamedTuple):
     stuck_thrust: PerRotor  # N, delivered where stuck
 
 
-class StuckAt(NamedTuple):
-    """Whether a rotor has stopped following its command, and what it delivers then."""
+class Effect(NamedTuple):
+    """What a fault does to its rotor at one time."""
 
-    active: Scalar  # 1/0
-    thrust: Scalar  # N
+    effectiveness: Scalar = 1.0  # what it leaves of the thrust
+    stuck: Scalar = 0.0  # 1 where the rotor does not follow its command
+    stuck_thrust: Scalar = 0.0  # N, delivered then
 
 
-class Fault(Protocol):
-    """A fault of one rotor: either it takes effectiveness or it holds the thrust; the other says nothing."""
+class OneRotor(Strict):
+    """What every fault has: the rotor that it hits."""
 
-    settings: Any
+    rotor: int = Field(ge=1, le=4, description="number of the rotor, 1 to 4")
 
-    def parameters(self) -> Any:
-        """Times in s, losses and thrusts as a record of numbers."""
+
+class Fault(Timed[Effect, MemoryT, ParametersT]):
+    """A fault of one rotor: either it takes effectiveness or it holds the thrust.
+
+    Its settings have the field `rotor`. Which rotor is hit is a choice of structure, times and losses are numbers.
+    """
 
     @property
-    def onset(self) -> float:
+    def rotor(self) -> int:
+        """Number of the rotor that it hits, from 1."""
+        number: int = self.settings.rotor
+        return number
+
+    def onset(self, parameters: ParametersT) -> Scalar:
         """Time of its first effect in s."""
+        raise NotImplementedError(f"{type(self).__name__} has no onset")
 
-    @staticmethod
-    def true_loss(settings: Any) -> float:
-        """Largest loss that it reaches, for reports; NaN where it is no loss."""
-
-    def effectiveness(self, time: Scalar, parameters: Any) -> Scalar:
-        """What it leaves of the thrust at a time in s."""
-        return 1.0
-
-    def stuck(self, time: Scalar, parameters: Any) -> StuckAt:
-        """Whether it holds the thrust at a time in s, and where."""
-        return StuckAt(0.0, 0.0)
+    def final_loss(self, parameters: ParametersT) -> Scalar | None:
+        """Lost share of the thrust that remains for good; None where the loss depends on the command."""
+        return None
 
 
-FAULTS: Registry[type] = Registry("fault")
+FAULT = Slot(
+    "fault",
+    Fault,
+    "truth",
+    "what goes wrong with the rotors, in the order given: [[fault]] tables",
+    "faults",
+    many=True,
+)
 
 
 def since(time: Scalar, start: Scalar) -> Scalar:
@@ -82,13 +94,15 @@ def since(time: Scalar, start: Scalar) -> Scalar:
     return greater_equal(time, start - TIME_TOLERANCE)
 
 
-def rotor_faults(faults: Sequence[Fault], parameters: Sequence[Any], time: Scalar) -> RotorFault:
+def rotor_faults(
+    faults: Sequence[Fault[Any, Any]], memories: Sequence[Any], parameters: Sequence[Any], time: Scalar
+) -> RotorFault:
     """Combine all faults at one time.
 
     Parameters
     ----------
     faults : sequence of Fault
-    parameters : sequence of records
+    memories, parameters : sequence of records
         One for each fault.
     time : scalar, s
         Since the start of the flight.
@@ -102,19 +116,13 @@ def rotor_faults(faults: Sequence[Fault], parameters: Sequence[Any], time: Scala
     effectiveness: list[Scalar] = [1.0] * 4
     stuck: list[Scalar] = [0.0] * 4
     thrust: list[Scalar] = [0.0] * 4
-    for fault, numbers in zip(faults, parameters, strict=True):
-        i = fault.settings.rotor - 1
-        effectiveness[i] = effectiveness[i] * fault.effectiveness(time, numbers)
-        held = fault.stuck(time, numbers)
-        stuck[i] = either(stuck[i], held.active)
-        thrust[i] = select(held.active, held.thrust, thrust[i])
+    for fault, memory, numbers in zip(faults, memories, parameters, strict=True):
+        i = fault.rotor - 1
+        effect = fault.at(time, memory, numbers)
+        effectiveness[i] = effectiveness[i] * effect.effectiveness
+        stuck[i] = either(stuck[i], effect.stuck)
+        thrust[i] = select(effect.stuck, effect.stuck_thrust, thrust[i])
     return RotorFault(PerRotor(*effectiveness), PerRotor(*stuck), PerRotor(*thrust))
-
-
-class OneRotor(Strict):
-    """What every fault has: the rotor that it hits."""
-
-    rotor: int = Field(ge=1, le=4, description="number of the rotor, 1 to 4")
 
 
 class OneRotorInterval(OneRotor):
@@ -138,8 +146,8 @@ class StepParameters(NamedTuple):
 
 
 @final
-@FAULTS.register("step")
-class Step(Fault):
+@register("step")
+class Step(Fault[Nothing, StepParameters]):
     """Sudden partial loss of one rotor's thrust, for good."""
 
     class Settings(OneRotor):
@@ -148,26 +156,21 @@ class Step(Fault):
         time: float = Field(ge=0.0, description="time of the loss [s]")
         loss: float = Field(ge=0.0, le=1.0, description="lost share of the thrust, 0 to 1")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> StepParameters:
+    def parameters(self, context: Context) -> StepParameters:
         """Time and loss."""
         return StepParameters(self.settings.time, self.settings.loss)
 
-    @property
-    def onset(self) -> float:
+    def onset(self, parameters: StepParameters) -> Scalar:
         """Time of the loss in s."""
-        return self.settings.time
+        return parameters.time
 
-    @staticmethod
-    def true_loss(settings: Settings) -> float:
+    def final_loss(self, parameters: StepParameters) -> Scalar:
         """The loss."""
-        return settings.loss
+        return parameters.loss
 
-    def effectiveness(self, time: Scalar, parameters: StepParameters) -> Scalar:
+    def at(self, time: Scalar, memory: Nothing, parameters: StepParameters) -> Effect:
         """1 before, 1 - loss from the time on."""
-        return 1.0 - parameters.loss * since(time, parameters.time)
+        return Effect(1.0 - parameters.loss * since(time, parameters.time))
 
 
 class RampParameters(NamedTuple):
@@ -179,8 +182,8 @@ class RampParameters(NamedTuple):
 
 
 @final
-@FAULTS.register("ramp")
-class Ramp(Fault):
+@register("ramp")
+class Ramp(Fault[Nothing, RampParameters]):
     """Gradual partial loss of one rotor's thrust, linear in time, then constant."""
 
     class Settings(OneRotorInterval):
@@ -188,27 +191,22 @@ class Ramp(Fault):
 
         loss: float = Field(ge=0.0, le=1.0, description="share of the thrust lost in the end, 0 to 1")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> RampParameters:
+    def parameters(self, context: Context) -> RampParameters:
         """Both times and the final loss."""
         return RampParameters(self.settings.start, self.settings.end, self.settings.loss)
 
-    @property
-    def onset(self) -> float:
+    def onset(self, parameters: RampParameters) -> Scalar:
         """Start of the ramp in s."""
-        return self.settings.start
+        return parameters.start
 
-    @staticmethod
-    def true_loss(settings: Settings) -> float:
-        """The loss in the end."""
-        return settings.loss
+    def final_loss(self, parameters: RampParameters) -> Scalar:
+        """The loss at the end of the ramp."""
+        return parameters.loss
 
-    def effectiveness(self, time: Scalar, parameters: RampParameters) -> Scalar:
+    def at(self, time: Scalar, memory: Nothing, parameters: RampParameters) -> Effect:
         """Falls linearly from 1 to 1 - loss between the two times."""
         share = clip((time - parameters.start) / (parameters.end - parameters.start), 0.0, 1.0)
-        return 1.0 - parameters.loss * share
+        return Effect(1.0 - parameters.loss * share)
 
 
 class IntermittentParameters(NamedTuple):
@@ -222,8 +220,8 @@ class IntermittentParameters(NamedTuple):
 
 
 @final
-@FAULTS.register("intermittent")
-class Intermittent(Fault):
+@register("intermittent")
+class Intermittent(Fault[Nothing, IntermittentParameters]):
     """Partial loss of one rotor's thrust that comes and goes with a period."""
 
     class Settings(OneRotorInterval):
@@ -233,32 +231,27 @@ class Intermittent(Fault):
         duty: float = Field(0.5, gt=0.0, le=1.0, description="share of each period in which the loss is there")
         loss: float = Field(ge=0.0, le=1.0, description="lost share of the thrust while it is there, 0 to 1")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> IntermittentParameters:
+    def parameters(self, context: Context) -> IntermittentParameters:
         """Times, duty and loss."""
         s = self.settings
         return IntermittentParameters(s.start, s.end, s.period, s.duty, s.loss)
 
-    @property
-    def onset(self) -> float:
+    def onset(self, parameters: IntermittentParameters) -> Scalar:
         """Time of the first onset in s."""
-        return self.settings.start
+        return parameters.start
 
-    @staticmethod
-    def true_loss(settings: Settings) -> float:
-        """The loss while it is there."""
-        return settings.loss
+    def final_loss(self, parameters: IntermittentParameters) -> Scalar:
+        """None remains after the end."""
+        return 0.0
 
-    def effectiveness(self, time: Scalar, parameters: IntermittentParameters) -> Scalar:
+    def at(self, time: Scalar, memory: Nothing, parameters: IntermittentParameters) -> Effect:
         """1 - loss in the first `duty` of each period between start (included) and end (excluded), else 1."""
         p = parameters
         # A remainder without floor, which symbols lack: the angle from the middle of the time on, wrapped to a turn.
         turns = (time - p.start + TIME_TOLERANCE) / p.period
         on = less_equal(absolute(wrap_angle((2.0 * math.pi) * (turns - 0.5 * p.duty))), math.pi * p.duty)
         within = both(since(time, p.start), less(time, p.end - TIME_TOLERANCE))
-        return 1.0 - p.loss * both(on, within)
+        return Effect(1.0 - p.loss * both(on, within))
 
 
 class StuckParameters(NamedTuple):
@@ -269,8 +262,8 @@ class StuckParameters(NamedTuple):
 
 
 @final
-@FAULTS.register("stuck")
-class Stuck(Fault):
+@register("stuck")
+class Stuck(Fault[Nothing, StuckParameters]):
     """One rotor delivers a fixed thrust from a time on, whatever is commanded."""
 
     class Settings(OneRotor):
@@ -279,26 +272,17 @@ class Stuck(Fault):
         time: float = Field(ge=0.0, description="time from which the rotor does not follow its command [s]")
         thrust: float = Field(description="thrust that it delivers from then on [N]; not limited")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> StuckParameters:
+    def parameters(self, context: Context) -> StuckParameters:
         """Time and thrust."""
         return StuckParameters(self.settings.time, self.settings.thrust)
 
-    @property
-    def onset(self) -> float:
+    def onset(self, parameters: StuckParameters) -> Scalar:
         """Time from which it is stuck, in s."""
-        return self.settings.time
+        return parameters.time
 
-    @staticmethod
-    def true_loss(settings: Settings) -> float:
-        """NaN: which share is lost depends on what is commanded."""
-        return math.nan
-
-    def stuck(self, time: Scalar, parameters: StuckParameters) -> StuckAt:
+    def at(self, time: Scalar, memory: Nothing, parameters: StuckParameters) -> Effect:
         """Held from the time on."""
-        return StuckAt(since(time, parameters.time), parameters.thrust)
+        return Effect(1.0, since(time, parameters.time), parameters.thrust)
 
 
 class TotalParameters(NamedTuple):
@@ -308,8 +292,8 @@ class TotalParameters(NamedTuple):
 
 
 @final
-@FAULTS.register("total")
-class Total(Fault):
+@register("total")
+class Total(Fault[Nothing, TotalParameters]):
     """Sudden total loss of one rotor's thrust."""
 
     class Settings(OneRotor):
@@ -317,23 +301,18 @@ class Total(Fault):
 
         time: float = Field(ge=0.0, description="time of the loss [s]")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> TotalParameters:
+    def parameters(self, context: Context) -> TotalParameters:
         """The time."""
         return TotalParameters(self.settings.time)
 
-    @property
-    def onset(self) -> float:
+    def onset(self, parameters: TotalParameters) -> Scalar:
         """Time of the loss in s."""
-        return self.settings.time
+        return parameters.time
 
-    @staticmethod
-    def true_loss(settings: Settings) -> float:
+    def final_loss(self, parameters: TotalParameters) -> Scalar:
         """Everything."""
         return 1.0
 
-    def effectiveness(self, time: Scalar, parameters: TotalParameters) -> Scalar:
+    def at(self, time: Scalar, memory: Nothing, parameters: TotalParameters) -> Effect:
         """1 before, 0 from the time on."""
-        return 1.0 - since(time, parameters.time)
+        return Effect(1.0 - since(time, parameters.time))

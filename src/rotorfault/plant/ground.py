@@ -20,19 +20,64 @@ rho_z as lever of friction is a simplification with the same end. Rotor tips and
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
-from rotorfault.maths.geometry import Vec3, euler_matrix
+from pydantic import Field
+
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar, maximum, sqrt
-from rotorfault.model.signals import Measurement
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT
+from rotorfault.model.signals import State
+from rotorfault.model.slot import Slot, register
 
-SAG = 0.002  # m: how far the feet sink under the weight
-DAMPING = 4.0  # s/m: a of Hunt and Crossley; no bounce is faster than 0.25 m/s
-FRICTION = 0.6  # coefficient mu, rubber on concrete or wood
-SLIP_SPEED = 0.05  # m/s: v_s, below which friction grows in proportion to the speed
-FOOT_SPREAD = 2.0  # half side of the square of feet over rho
-LARGEST_STEP = 0.005  # s: integration step up to which contact is stable with room to spare
+LARGEST_STEP = 0.005  # s: integration step up to which contact with the default gear is stable with room to spare
+
+
+class Contact(NamedTuple):
+    """What the ground does to the vehicle."""
+
+    force_W: Vec3  # N
+    torque_B: Vec3  # N m
+    normal: Scalar  # N, vertical part of the force
+
+
+class Ground(Block[State, Contact, MemoryT, ParametersT]):
+    """Ground to stand on: a function of the true motion, asked for by the integrator."""
+
+    def contact(self, state: State, parameters: ParametersT) -> Contact:
+        """Force and torque on the vehicle.
+
+        Parameters
+        ----------
+        state : State
+            The true one.
+        parameters : record
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no contact")
+
+    def height(self, parameters: ParametersT) -> Scalar:
+        """Height in m of the centre of mass when the vehicle stands on it; below it a flight is lost."""
+        raise NotImplementedError(f"{type(self).__name__} has no height")
+
+
+def _level(value: Any) -> Any:
+    """A bare number is the height of level ground."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return {"kind": "level", "height": value}
+    return value
+
+
+GROUND = Slot(
+    "ground",
+    Ground,
+    "truth",
+    "ground to stand on, or its height alone [m]; none if not given",
+    "grounds",
+    default="level",
+    optional=True,
+    shorthand=_level,
+)
 
 
 class GroundParameters(NamedTuple):
@@ -48,55 +93,53 @@ class GroundParameters(NamedTuple):
     yaw_lever: Scalar  # m, rho_z
 
 
-class Contact(NamedTuple):
-    """What the ground does to the vehicle."""
-
-    force_W: Vec3  # N
-    torque_B: Vec3  # N m
-    normal: Scalar  # N, vertical part of the force
-
-
 @final
-class Ground:
-    """Level ground under a vehicle with four feet.
+@register("level")
+class Level(Ground[Nothing, GroundParameters]):
+    """Level ground under a vehicle with four feet: spring-dampers and friction."""
 
-    Parameters
-    ----------
-    height : float
-        Of the centre of mass with all feet just touching, in m.
-    """
+    class Settings(Strict):
+        """Height, and the landing gear, whose springs and size follow from the vehicle."""
 
-    def __init__(self, height: float) -> None:
-        self.height = height
+        height: float = Field(default=0.0, description="height of the centre of mass with all feet just touching [m]")
+        sag: float = Field(default=0.002, gt=0.0, description="how far the feet sink under the weight [m]")
+        damping: float = Field(
+            default=4.0, ge=0.0, description="a of Hunt and Crossley; no bounce is faster than 1/a [s/m]"
+        )
+        friction: float = Field(default=0.6, ge=0.0, description="coefficient mu; 0.6 is rubber on concrete or wood")
+        slip_speed: float = Field(
+            default=0.05, gt=0.0, description="below it friction grows in proportion to the speed [m/s]"
+        )
+        foot_spread: float = Field(
+            default=2.0, gt=0.0, description="half side of the square of feet over the radius of gyration"
+        )
 
-    def parameters(self, vehicle: Vehicle) -> GroundParameters:
+    def parameters(self, context: Context) -> GroundParameters:
         """Numbers for a vehicle."""
+        s, vehicle = self.settings, context.vehicle
         J = vehicle.inertia
         radius = sqrt(0.5 * (J.x + J.y) / vehicle.mass)
         return GroundParameters(
-            height=self.height,
+            height=s.height,
             leg=radius,
-            spread=FOOT_SPREAD * radius,
-            stiffness=vehicle.mass * vehicle.gravity / (4.0 * SAG),
-            damping=DAMPING,
-            friction=FRICTION,
-            slip_speed=SLIP_SPEED,
+            spread=s.foot_spread * radius,
+            stiffness=vehicle.mass * vehicle.gravity / (4.0 * s.sag),
+            damping=s.damping,
+            friction=s.friction,
+            slip_speed=s.slip_speed,
             yaw_lever=sqrt(J.z / vehicle.mass),
         )
 
-    def contact(self, measurement: Measurement, parameters: GroundParameters) -> Contact:
-        """Force and torque on the vehicle.
+    def height(self, parameters: GroundParameters) -> Scalar:
+        """The same everywhere."""
+        return parameters.height
 
-        Parameters
-        ----------
-        measurement : Measurement
-            The true one.
-        parameters : GroundParameters
-        """
-        p, v_W, omega_B = parameters, measurement.v_W, measurement.omega_B
-        R_WB = euler_matrix(measurement.attitude)
+    def contact(self, state: State, parameters: GroundParameters) -> Contact:
+        """Springs, dampers and friction of four feet."""
+        p, v_W, omega_B = parameters, state.v_W, state.omega_B
+        R_WB = state.q_WB.matrix()
         up_B = Vec3(R_WB.zx, R_WB.zy, R_WB.zz)
-        clearance = measurement.p_W.z - (p.height - p.leg)
+        clearance = state.p_W.z - (p.height - p.leg)
         normal: Scalar = 0.0
         lever_B = Vec3(0.0, 0.0, 0.0)  # sum of N_i r_i
         for x, y in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):

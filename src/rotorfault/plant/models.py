@@ -9,55 +9,69 @@ models differ in their kinematics.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, TypeVar
 
-from rotorfault.base.registry import Registry
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement, Wrench
-from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
-from rotorfault.plant.aero import drag_acceleration
+from rotorfault.model.block import Block, Nothing
+from rotorfault.model.motion import angular_acceleration, drag_acceleration
+from rotorfault.model.signals import State, Wrench
+from rotorfault.model.slot import Slot
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.plant.wind import Air
 
+BodyT = TypeVar("BodyT", bound=tuple[Any, ...])
 
-class BodyModel(Protocol):
-    """Motion of the body under a wrench: a state record and its derivative."""
+__all__ = ["PLANT", "BodyModel", "acceleration", "angular_acceleration"]
 
-    def initial(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> Any:
+
+class BodyModel(Block[State, BodyT, BodyT, Nothing]):
+    """Motion of the body under a wrench: a state record and its derivative, which the plant integrates."""
+
+    def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> BodyT:
         """State record for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and rates [rad/s]."""
+        raise NotImplementedError(f"{type(self).__name__} has no start")
 
     def derivative(
         self,
-        body: Any,
+        body: BodyT,
         wrench: Wrench,
         extra_acceleration_W: Vec3,
         vehicle: Vehicle,
         residual_speed: Scalar,
         air: Air,
-    ) -> Any:
+    ) -> BodyT:
         """Time derivative of the state, as a record of the same shape.
 
         Parameters
         ----------
         body : record
+            State of the body.
         wrench : Wrench
             Of the thrusts that the rotors deliver.
         extra_acceleration_W : Vec3, m/s^2, world frame
             Added to the translational acceleration.
         vehicle : Vehicle
+            The true one.
         residual_speed : scalar, rad/s
             Sum of the signed rotor speeds, Omega of (4).
         air : Air
+            At the time of the state.
         """
+        raise NotImplementedError(f"{type(self).__name__} has no derivative")
 
-    def after_step(self, body: Any) -> Any:
+    def after_step(self, body: BodyT) -> BodyT:
         """Put a state that an integration step has left back on its constraints, if it has any."""
+        return body
 
-    def observe(self, body: Any) -> Measurement:
-        """Position, velocity, attitude and rates as perfect sensors would give them."""
+    def observe(self, body: BodyT) -> State:
+        """Position, velocity, attitude and rates."""
+        raise NotImplementedError(f"{type(self).__name__} cannot be observed")
 
 
-PLANTS: Registry[type] = Registry("plant")
+PLANT = Slot(
+    "plant", BodyModel, "truth", "model of the body's motion", "plants", default="rigid_body",
+)  # fmt: skip
 
 
 def acceleration(
@@ -67,11 +81,4 @@ def acceleration(
     gravity_W = Vec3(0.0, 0.0, -vehicle.gravity)
     disturbance_W = air.acceleration_W + extra_acceleration_W
     lift_W: Vec3 = thrust_axis_W * (thrust / vehicle.mass)
-    return lift_W + gravity_W + drag_acceleration(vehicle, v_W, air.velocity_W) + disturbance_W
-
-
-def angular_acceleration(vehicle: Vehicle, torque_B: Vec3, omega_B: Vec3, residual_speed: Scalar) -> Vec3:
-    """Angular acceleration in rad/s^2, body frame, for a torque in N m; (1), and the attitude rows of (3)."""
-    J = vehicle.inertia
-    torque_all_B = torque_B + gyroscopic_torque(vehicle, omega_B, residual_speed) - omega_B.cross(J.times(omega_B))
-    return torque_all_B.over(J)
+    return lift_W + gravity_W + drag_acceleration(vehicle, air.velocity_W - v_W) + disturbance_W

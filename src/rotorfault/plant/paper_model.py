@@ -15,11 +15,14 @@ from __future__ import annotations
 
 from typing import NamedTuple, final
 
-from rotorfault.maths.geometry import Vec3, body_z_axis
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.rotation import Quat, body_z_axis
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement, Wrench
+from rotorfault.model.motion import angular_acceleration
+from rotorfault.model.signals import State, Wrench
+from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant.models import PLANTS, acceleration, angular_acceleration
+from rotorfault.plant.models import BodyModel, acceleration
 from rotorfault.plant.wind import Air
 
 
@@ -33,11 +36,11 @@ class PaperState(NamedTuple):
 
 
 @final
-@PLANTS.register("paper_model")
-class PaperModel:
+@register("paper_model")
+class PaperModel(BodyModel[PaperState]):
     """The paper's equation (3), corrected: Euler angles, Euler rates taken for body rates."""
 
-    def initial(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> PaperState:
+    def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> PaperState:
         """State for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and their rates [rad/s]."""
         return PaperState(p_W, v_W, attitude, omega_B)
 
@@ -59,10 +62,6 @@ class PaperModel:
             attitude_rate=angular_acceleration(vehicle, wrench.torque_B, body.attitude_rate, residual_speed),
         )
 
-    def after_step(self, body: PaperState) -> PaperState:
-        """Nothing to put back."""
-        return body
-
-    def observe(self, body: PaperState) -> Measurement:
+    def observe(self, body: PaperState) -> State:
         """The state as it is; omega_B holds the Euler rates."""
-        return Measurement(body.p_W, body.v_W, body.attitude, body.attitude_rate)
+        return State(body.p_W, body.v_W, Quat.from_euler(body.attitude), body.attitude_rate)

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from typing import NamedTuple, final
 
-from rotorfault.maths.geometry import Quat, Vec3
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement, Wrench
+from rotorfault.model.motion import angular_acceleration
+from rotorfault.model.signals import State, Wrench
+from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant.models import PLANTS, acceleration, angular_acceleration
+from rotorfault.plant.models import BodyModel, acceleration
 from rotorfault.plant.wind import Air
 
 
@@ -28,11 +31,11 @@ class RigidBodyState(NamedTuple):
 
 
 @final
-@PLANTS.register("rigid_body")
-class RigidBody:
+@register("rigid_body")
+class RigidBody(BodyModel[RigidBodyState]):
     """Rigid body on SO(3): quaternion attitude, valid at any angle."""
 
-    def initial(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> RigidBodyState:
+    def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> RigidBodyState:
         """State for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and body rates [rad/s]."""
         return RigidBodyState(p_W, v_W, Quat.from_euler(attitude), omega_B)
 
@@ -59,6 +62,6 @@ class RigidBody:
         """Bring the quaternion back to unit length, which integration keeps only to its own order."""
         return body._replace(q_WB=body.q_WB.normalised())
 
-    def observe(self, body: RigidBodyState) -> Measurement:
-        """Attitude as Euler angles, roll and yaw in (-pi, pi]."""
-        return Measurement(body.p_W, body.v_W, body.q_WB.euler(), body.omega_B)
+    def observe(self, body: RigidBodyState) -> State:
+        """The state as it is."""
+        return State(body.p_W, body.v_W, body.q_WB, body.omega_B)

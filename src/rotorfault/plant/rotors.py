@@ -19,11 +19,6 @@ from rotorfault.plant.faults import RotorFault
 _LEAST_SHARE = 0.05
 
 
-def limited_command(vehicle: Vehicle, command: PerRotor) -> PerRotor:
-    """Commands in N put within the rotor limits."""
-    return command.map(lambda u: clip(u, vehicle.thrust_min, vehicle.thrust_max))
-
-
 def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> PerRotor:
     """Time derivative in N/s of the lag outputs v in N, for commands in N that are within the limits."""
     rate: PerRotor = (limited - output) * vehicle.rotor_bandwidth

@@ -1,80 +1,59 @@
-"""Sensors: from the truth to what the autopilot sees.
+"""Sensors: from the truth to the readings that the autopilot gets.
 
-Noise enters as an input of standard normal numbers, drawn outside per flight and step, so that a flight is the same
-alone and in a batch and on every engine.
+Sensors have memory, so that a set may have bias, rates and delays of its own; a reading says whether it is valid and
+how old it is. Noise enters as standard normal numbers, drawn outside per flight and step, so that a flight is the
+same alone and in a batch and on every engine.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple, Protocol, final
+from typing import ClassVar, NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.base.config import Strict
-from rotorfault.base.registry import Registry
-from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement
+from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, Record
+from rotorfault.model.signals import Reading, Readings, State
+from rotorfault.model.slot import Slot, register
 
 
-class Normals(NamedTuple):
-    """Twelve independent standard normal numbers."""
+class SensorInputs(NamedTuple):
+    """The truth that sensors measure at one sampling instant."""
 
-    position: Vec3
-    velocity: Vec3
-    attitude: Vec3
-    rate: Vec3
-
-
-def no_noise() -> Normals:
-    """The input of sensors that need none."""
-    return Normals(zeros(), zeros(), zeros(), zeros())
+    time: Scalar  # s since the start of the flight
+    state: State
+    specific_force_B: Vec3  # m/s^2: acceleration less gravity of the centre of mass, as an accelerometer feels it
+    normals: tuple[Scalar, ...] = ()  # independent standard normal numbers, as many as the part says it needs
 
 
-class Sensors(Protocol):
-    """Sensors: choices in `Settings`, numbers in `parameters`, a pure function in `sense`."""
-
-    needs_noise: ClassVar[bool]
-
-    @property
-    def delay(self) -> int:
-        """Sampling periods by which the autopilot gets its measurements late."""
-
-    def parameters(self) -> Any:
-        """Numbers of the sensors as a record."""
-
-    def sense(self, measurement: Measurement, normals: Normals, parameters: Any) -> Measurement:
-        """What the autopilot sees of a true measurement."""
+class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
+    """A set of sensors: `step` turns the truth of a sampling instant into readings."""
 
 
-SENSORS: Registry[type] = Registry("sensors")
-
-
-class IdealParameters(NamedTuple):
-    """The record without numbers."""
+SENSORS = Slot("sensors", Sensors, "truth", "what the autopilot can measure", "sensors", default="ideal")
 
 
 @final
-@SENSORS.register("ideal")
-class Ideal:
+@register("ideal")
+class Ideal(Sensors[Nothing, Nothing]):
     """Perfect sensors."""
 
-    needs_noise: ClassVar[bool] = False
-    delay = 0
-
-    class Settings(Strict):
-        """Nothing to choose."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> IdealParameters:
-        """No numbers."""
-        return IdealParameters()
-
-    def sense(self, measurement: Measurement, normals: Normals, parameters: IdealParameters) -> Measurement:
+    def step(
+        self, memory: Nothing, inputs: SensorInputs, parameters: Nothing, dt: Scalar
+    ) -> tuple[Nothing, Readings, Record]:
         """The truth."""
-        return measurement
+        state = inputs.state
+        readings = Readings(
+            position=Reading(state.p_W),
+            velocity=Reading(state.v_W),
+            attitude=Reading(state.q_WB),
+            rates=Reading(state.omega_B),
+            specific_force=Reading(inputs.specific_force_B),
+        )
+        return memory, readings, Nothing()
 
 
 class NoisyParameters(NamedTuple):
@@ -86,41 +65,66 @@ class NoisyParameters(NamedTuple):
     rate: Scalar  # rad/s
 
 
+Measured = tuple[Vec3, Vec3, Quat, Vec3, Vec3]
+"""Position, velocity, attitude, rates and specific force, with their noise."""
+
+
+class NoisyMemory(NamedTuple):
+    """Measurements on their way to the autopilot, the oldest first."""
+
+    late: tuple[Measured, ...]
+
+
 @final
-@SENSORS.register("noisy")
-class Noisy:
+@register("noisy")
+class Noisy(Sensors[NoisyMemory, NoisyParameters]):
     """White Gaussian noise on position, velocity, attitude and rates, and a delay."""
 
-    needs_noise: ClassVar[bool] = True
+    normals: ClassVar[int] = 12
 
     class Settings(Strict):
         """Standard deviation of each component; new numbers at every sampling instant."""
 
         position: float = Field(0.005, ge=0.0, description="standard deviation of position [m]")
         velocity: float = Field(0.01, ge=0.0, description="standard deviation of velocity [m/s]")
-        attitude: float = Field(0.002, ge=0.0, description="standard deviation of roll, pitch and yaw [rad]")
+        attitude: float = Field(
+            0.002, ge=0.0, description="standard deviation of small rotations about each body axis [rad]"
+        )
         rate: float = Field(0.005, ge=0.0, description="standard deviation of the rates [rad/s]")
         delay: int = Field(0, ge=0, le=100, description="sampling periods by which measurements come late")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    @property
-    def delay(self) -> int:
-        """Sampling periods by which measurements come late."""
-        return self.settings.delay
-
-    def parameters(self) -> NoisyParameters:
+    def parameters(self, context: Context) -> NoisyParameters:
         """The four standard deviations."""
         s = self.settings
         return NoisyParameters(s.position, s.velocity, s.attitude, s.rate)
 
-    def sense(self, measurement: Measurement, normals: Normals, parameters: NoisyParameters) -> Measurement:
-        """Truth plus noise."""
-        m, n, std = measurement, normals, parameters
-        return Measurement(
-            p_W=m.p_W + n.position * std.position,
-            v_W=m.v_W + n.velocity * std.velocity,
-            attitude=m.attitude + n.attitude * std.attitude,
-            omega_B=m.omega_B + n.rate * std.rate,
+    def initial(self, inputs: SensorInputs, parameters: NoisyParameters) -> NoisyMemory:
+        """The first measurement, as often as the delay asks for."""
+        return NoisyMemory((self._measured(inputs, parameters),) * self.settings.delay)
+
+    def step(
+        self, memory: NoisyMemory, inputs: SensorInputs, parameters: NoisyParameters, dt: Scalar
+    ) -> tuple[NoisyMemory, Readings, Record]:
+        """Truth plus noise, late."""
+        oldest, *late = (*memory.late, self._measured(inputs, parameters))
+        age = self.settings.delay * dt
+        position, velocity, attitude, rates, force = oldest
+        readings = Readings(
+            position=Reading(position, age=age),
+            velocity=Reading(velocity, age=age),
+            attitude=Reading(attitude, age=age),
+            rates=Reading(rates, age=age),
+            specific_force=Reading(force, age=age),
+        )
+        return NoisyMemory(tuple(late)), readings, Nothing()
+
+    def _measured(self, inputs: SensorInputs, std: NoisyParameters) -> Measured:
+        state, n = inputs.state, inputs.normals
+        position, velocity, attitude, rate = (Vec3.of(n[k : k + 3]) for k in (0, 3, 6, 9))
+        return (
+            state.p_W + position * std.position,
+            state.v_W + velocity * std.velocity,
+            state.q_WB @ Quat.small(attitude * std.attitude),
+            state.omega_B + rate * std.rate,
+            inputs.specific_force_B,
         )

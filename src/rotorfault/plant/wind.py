@@ -9,14 +9,16 @@ is the paper's equation (45), in m/s^2 on x, y, z. The terms (t - 20), ... are p
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, NamedTuple, Protocol, final
+from typing import NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.base.config import Strict
-from rotorfault.base.registry import Registry
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, sin
+from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT
+from rotorfault.model.slot import Slot, register
+from rotorfault.plant.timed import Timed
 
 
 class Air(NamedTuple):
@@ -26,68 +28,22 @@ class Air(NamedTuple):
     acceleration_W: Vec3  # m/s^2, disturbance that acts directly, whatever the vehicle's velocity
 
 
-class FirstNormals(NamedTuple):
-    """Six independent standard normal numbers to start the memory of a wind from: two per axis."""
+class Wind(Timed[Air, MemoryT, ParametersT]):
+    """A wind: `at` gives the air; gusts have memory and get normal numbers in `step`.
 
-    first: Vec3
-    second: Vec3
-
-
-def no_first_normals() -> FirstNormals:
-    """The start of winds that need no noise."""
-    return FirstNormals(zeros(), zeros())
-
-
-class Wind(Protocol):
-    """A wind: choices in `Settings`, numbers in `parameters`, memory that a pure `step` passes on, the air in `at`.
-
-    A wind without memory, which is what it says unless it says otherwise, has no rows in the state of a flight and
-    costs no operation.
+    A wind without memory has no rows in the state of a flight and costs no operation.
     """
 
-    needs_noise: ClassVar[bool] = False
-    """Whether normal numbers enter; else those handed to `initial` and `step` are zeros."""
 
-    def __init__(self, settings: Any) -> None: ...
-
-    def parameters(self) -> Any:
-        """Numbers of the wind as a record."""
-
-    def initial(self, normals: FirstNormals, parameters: Any, period: Scalar) -> Any:
-        """Memory as a record, before the first `step`, for a sampling period in s; empty where there is none."""
-        return ()
-
-    def step(self, memory: Any, normals: Vec3, parameters: Any, period: Scalar) -> Any:
-        """Memory for a sampling period [s], from that of the period before it and three normal numbers."""
-        return memory
-
-    def at(self, time: Scalar, memory: Any, parameters: Any) -> Air:
-        """The air at a time in s since the start of the flight; the memory is held over a sampling period."""
-
-
-WINDS: Registry[type] = Registry("wind")
-
-
-class NoParameters(NamedTuple):
-    """The record without numbers."""
+WIND = Slot("wind", Wind, "truth", "what the air does", "winds", default="none", streams=(1, 2))
 
 
 @final
-@WINDS.register("none")
-class NoWind(Wind):
+@register("none")
+class NoWind(Wind[Nothing, Nothing]):
     """Still air: no wind and no disturbance."""
 
-    class Settings(Strict):
-        """Nothing to choose."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> NoParameters:
-        """No numbers."""
-        return NoParameters()
-
-    def at(self, time: Scalar, memory: Any, parameters: NoParameters) -> Air:
+    def at(self, time: Scalar, memory: Nothing, parameters: Nothing) -> Air:
         """Air at rest."""
         return Air(zeros(), zeros())
 
@@ -99,8 +55,8 @@ class ConstantWindParameters(NamedTuple):
 
 
 @final
-@WINDS.register("constant")
-class ConstantWind(Wind):
+@register("constant")
+class ConstantWind(Wind[Nothing, ConstantWindParameters]):
     """Steady uniform wind, acting through the drag of the vehicle."""
 
     class Settings(Strict):
@@ -110,14 +66,11 @@ class ConstantWind(Wind):
             (-3.33, 1.36, 0.0), description="velocity of the air over ground along x, y, z of the world [m/s]"
         )
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> ConstantWindParameters:
+    def parameters(self, context: Context) -> ConstantWindParameters:
         """The wind velocity."""
         return ConstantWindParameters(Vec3.of(self.settings.velocity_W))
 
-    def at(self, time: Scalar, memory: Any, parameters: ConstantWindParameters) -> Air:
+    def at(self, time: Scalar, memory: Nothing, parameters: ConstantWindParameters) -> Air:
         """The same at all times."""
         return Air(parameters.velocity_W, zeros())
 
@@ -129,8 +82,8 @@ class PaperWindParameters(NamedTuple):
 
 
 @final
-@WINDS.register("paper")
-class PaperWind(Wind):
+@register("paper")
+class PaperWind(Wind[Nothing, PaperWindParameters]):
     """Time-varying disturbance accelerations of the paper's equation (45), on x, y and z."""
 
     class Settings(Strict):
@@ -138,14 +91,11 @@ class PaperWind(Wind):
 
         scale: float = Field(1.0, ge=0.0, description="factor on equation (45); 1 is the paper's wind")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def parameters(self) -> PaperWindParameters:
+    def parameters(self, context: Context) -> PaperWindParameters:
         """The factor."""
         return PaperWindParameters(self.settings.scale)
 
-    def at(self, time: Scalar, memory: Any, parameters: PaperWindParameters) -> Air:
+    def at(self, time: Scalar, memory: Nothing, parameters: PaperWindParameters) -> Air:
         """Equation (45) at a time in s."""
         shift = Vec3(20.0, 30.0, 40.0)
         delta = shift.map(

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import InputError, unknown
 
 Array = NDArray[np.float64]
 

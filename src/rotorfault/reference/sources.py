@@ -14,21 +14,22 @@ acceleration are the exact derivatives of the position that is tabulated:
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, NamedTuple, Protocol, TypeAlias, final
+from typing import Annotated, Any, NamedTuple, TypeAlias, cast, final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_serializer, model_validator
 
+from rotorfault.base import foreign
 from rotorfault.base.config import Strict, read_text, refusal
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import Registry
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.records import flatten
+from rotorfault.model.block import Block, Nothing, Record
 from rotorfault.model.signals import Reference
+from rotorfault.model.slot import Slot, register
 from rotorfault.reference.csv_table import read_table
 
 Array: TypeAlias = NDArray[np.float64]
@@ -56,10 +57,8 @@ class ReferenceTable(NamedTuple):
         return Reference(p, v, a, self.yaw[rows], self.yaw_rate[rows], self.yaw_acceleration[rows])
 
 
-class ReferenceSource(Protocol):
-    """What a reference is. A final class with its configuration class as `Settings`, a `Strict`."""
-
-    def __init__(self, settings: Any) -> None: ...
+class ReferenceSource(Block[Nothing, ReferenceTable, Nothing, Nothing]):
+    """Where the vehicle should be, as a function of time: tabulated before the flight, not stepped in it."""
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants.
@@ -69,9 +68,20 @@ class ReferenceSource(Protocol):
         times : ndarray, shape (n,)
             In s from the start of the flight, 0 or greater.
         """
+        raise NotImplementedError(f"{type(self).__name__} has no table")
+
+    def signals(self, times: Array) -> Record:
+        """What it records of itself: an instance of `Telemetry` with arrays of shape (n,) as numbers.
+
+        Parameters
+        ----------
+        times : ndarray, shape (n,)
+            In s from the start of the flight.
+        """
+        return Nothing()
 
 
-REFERENCES: Registry[type[ReferenceSource]] = Registry("reference")
+REFERENCE = Slot("reference", ReferenceSource, "task", "where the vehicle should be", "references")
 
 
 def _table(four: Array, rate: Array, acceleration: Array) -> ReferenceTable:
@@ -79,9 +89,9 @@ def _table(four: Array, rate: Array, acceleration: Array) -> ReferenceTable:
     return ReferenceTable(four[:, :3], rate[:, :3], acceleration[:, :3], four[:, 3], rate[:, 3], acceleration[:, 3])
 
 
-@REFERENCES.register("set_point")
+@register("set_point")
 @final
-class SetPoint:
+class SetPoint(ReferenceSource):
     """One position and yaw, held for the whole flight."""
 
     class Settings(Strict):
@@ -89,9 +99,6 @@ class SetPoint:
 
         position: Triple = Field(description="x, y, z in the world frame [m]")
         yaw: float = Field(default=0.0, description="Yaw angle [rad]")
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -108,9 +115,9 @@ class Waypoint(Strict):
     yaw: float = Field(default=0.0, description="Yaw angle; it turns the way and as far as the numbers say [rad]")
 
 
-@REFERENCES.register("waypoints")
+@register("waypoints")
 @final
-class Waypoints:
+class Waypoints(ReferenceSource):
     """Points to be at rest in at given times, minimum-jerk motion between them."""
 
     class Settings(Strict):
@@ -128,9 +135,6 @@ class Waypoints:
                     allowed = f"later than the waypoint before, {before!r} s"
                     raise refusal(f"points.{number}.time", f"got {here!r} s; allowed: {allowed}")
             return self
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -150,9 +154,9 @@ class Waypoints:
         )
 
 
-@REFERENCES.register("sinusoid")
+@register("sinusoid")
 @final
-class Sinusoid:
+class Sinusoid(ReferenceSource):
     """offset + amplitude sin(frequency t + phase) on each axis, yaw constant."""
 
     class Settings(Strict):
@@ -163,9 +167,6 @@ class Sinusoid:
         phase: Triple = Field(default=(0.0, 0.0, 0.0), description="Phase of x, y, z at the start [rad]")
         offset: Triple = Field(default=(0.0, 0.0, 0.0), description="Centre of x, y, z [m]")
         yaw: float = Field(default=0.0, description="Yaw angle [rad]")
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -179,9 +180,9 @@ class Sinusoid:
         )
 
 
-@REFERENCES.register("square")
+@register("square")
 @final
-class Square:
+class Square(ReferenceSource):
     """Square waves through a first-order filter, on each axis and on yaw."""
 
     class Settings(Strict):
@@ -196,9 +197,6 @@ class Square:
         feed_forward: bool = Field(
             default=False, description="Pass on the filters' accelerations; else the reference says 0 [-]"
         )
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -235,9 +233,9 @@ def filtered_square(times: Array, amplitude: float, period: float, time_constant
     return np.stack([u + remainder, -remainder / time_constant, remainder / (time_constant * time_constant)])
 
 
-@REFERENCES.register("csv")
+@register("csv")
 @final
-class Csv:
+class Csv(ReferenceSource):
     """A table in a CSV file, interpolated smoothly; its last position is held after its end."""
 
     class Settings(Strict):
@@ -264,17 +262,18 @@ class Csv:
                 raise refusal("file", str(error)) from None
 
     def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+        super().__init__(settings)
         columns = read_table(settings.text or "", settings.file)
         # SciPy takes a third of a second to load, which a flight along any other reference need not spend.
-        curve = importlib.import_module("rotorfault.reference.curve").Curve
+        from rotorfault.reference.curve import Curve
+
         self._axes = [
-            curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
+            Curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
             for axis, rate, acceleration in (("x", "vx", "ax"), ("y", "vy", "ay"), ("z", "vz", "az"))
         ]
         # A logged yaw jumps by a full turn at the border; the vehicle does not.
         yaw = np.unwrap(columns["yaw"]) if "yaw" in columns else np.zeros_like(columns["t"])
-        self._axes.append(curve(columns["t"], yaw, columns.get("yaw_rate"), None))
+        self._axes.append(Curve(columns["t"], yaw, columns.get("yaw_rate"), None))
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -282,9 +281,9 @@ class Csv:
         return _table(four, rate, acceleration)
 
 
-@REFERENCES.register("function")
+@register("function")
 @final
-class Function:
+class Function(ReferenceSource):
     """A Python function of time that returns (x, y, z, yaw), or a `rotorfault.model.signals.Reference`."""
 
     class Settings(Strict):
@@ -295,6 +294,10 @@ class Function:
             "x, y, z [m] and yaw [rad], or a Reference with all derivatives"
         )
 
+        def code(self) -> tuple[str, ...]:
+            """The function's place, where it is named and not handed in."""
+            return (self.function,) if isinstance(self.function, str) else ()
+
         @field_serializer("function")
         def _place(self, function: Callable[[float], Any] | str) -> str:
             # A file cannot hold a function, but can say where it was; one of a module is found there again.
@@ -303,7 +306,7 @@ class Function:
             return f"{getattr(function, '__module__', '?')}:{getattr(function, '__qualname__', repr(function))}"
 
     def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+        super().__init__(settings)
         given = settings.function
         self._function = _import(given) if isinstance(given, str) else given
         self._name = given if isinstance(given, str) else getattr(given, "__name__", repr(given))
@@ -349,15 +352,7 @@ class Function:
 
 def _import(place: str) -> Callable[[float], Sequence[float] | Reference]:
     """Load a function from ``package.module:name``."""
-    module, _, name = place.partition(":")
-    if not module or not name:
-        raise InputError(f"reference function '{place}'; allowed: 'package.module:name'")
-    try:
-        found = getattr(importlib.import_module(module), name, None)
-    except Exception as error:
-        reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        hint = "install the module, or put its folder into PYTHONPATH"
-        raise InputError(f"reference function '{place}': cannot import '{module}' ({reason}); {hint}") from error
-    if not callable(found):
-        raise InputError(f"reference function '{place}': module '{module}' has no function '{name}'; check the name")
-    return found  # type: ignore[no-any-return]
+    function = foreign.load(place, "reference function")
+    if not callable(function):
+        raise InputError(f"reference function '{place}': it is no function; check the name")
+    return cast("Callable[[float], Sequence[float] | Reference]", function)

@@ -6,37 +6,21 @@ that a flight can be repeated from its file alone.
 
 from __future__ import annotations
 
-import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.files import in_folder, write_atomically
-from rotorfault.engine.batch import Array
-from rotorfault.model.telemetry import quantities
-from rotorfault.results.flight_data import FORMAT, FlightData, flight_data
+from rotorfault.loop.recorded import LoopSignals
+from rotorfault.results.flight_data import FORMAT, FlightData, Variable
 
-ATTRIBUTES = (
-    "scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "thrust_min", "thrust_max",
-)  # fmt: skip
+OLD_FORMAT = "rotorfault-flight-1"
+
+ATTRIBUTES = ("scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "scores")
 """Attributes that the summary of a flight needs."""
-
-
-def dataset(signals: Array, times: Array, attributes: dict[str, Any]) -> xr.Dataset:
-    """One flight's records as a dataset.
-
-    Parameters
-    ----------
-    signals : ndarray, shape (records, rows of `Signals`)
-    times : ndarray, shape (records,)
-        In s.
-    attributes : dict
-        Attributes of the dataset.
-    """
-    return as_dataset(flight_data(signals, times, attributes))
 
 
 def as_dataset(data: FlightData) -> xr.Dataset:
@@ -48,21 +32,16 @@ def as_dataset(data: FlightData) -> xr.Dataset:
     )
 
 
-def write_netcdf(data: xr.Dataset, path: Path) -> None:
-    """Write a dataset, compressed, whole or not at all.
+def as_flight_data(data: xr.Dataset) -> FlightData:
+    """A dataset's records as plain arrays, on the same memory."""
 
-    Raises
-    ------
-    InputError
-        If the folder does not exist.
-    OSError
-        If the file cannot be written, as on a full disk; nothing is left behind.
-    """
-    encoding = {name: {"zlib": True, "complevel": 1, "shuffle": True} for name in data.data_vars}
-    # Into memory first: on a full disk HDF5 does not raise but ends the process, and leaves half a file behind.
-    memory = io.BytesIO()
-    data.to_netcdf(memory, engine="h5netcdf", encoding=encoding)
-    write_atomically(in_folder(path), lambda temporary: temporary.write_bytes(memory.getbuffer()))
+    def variables(group: Mapping[Any, xr.DataArray]) -> dict[str, Variable]:
+        return {
+            str(name): Variable(tuple(map(str, one.dims)), one.values, {str(k): v for k, v in one.attrs.items()})
+            for name, one in group.items()
+        }
+
+    return FlightData(variables(data.data_vars), variables(data.coords), data.attrs)
 
 
 def read_netcdf(path: str | Path) -> xr.Dataset:
@@ -73,7 +52,20 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     InputError
         If it is missing, unreadable, truncated, or no flight of this program.
     """
-    path = Path(path)
+    data = _opened(Path(path))
+    form = data.attrs.get("format")
+    if form == OLD_FORMAT:
+        raise InputError(
+            f"{path}: was written by version {data.attrs.get('version', '0.1')} and holds other signals than this one "
+            "reads; 'rotorfault fly --repeat' flies it again"
+        )
+    if form != FORMAT:
+        raise InputError(f"{path}: attribute 'format' is {form!r}; allowed: '{FORMAT}'")
+    return data
+
+
+def _opened(path: Path) -> xr.Dataset:
+    """Any file that xarray reads, in memory."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a flight.nc that 'rotorfault fly' wrote")
     try:
@@ -83,9 +75,21 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         # h5py and xarray raise a dozen kinds for files that are truncated or no HDF5 at all.
         reason = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: cannot be read as a flight ({reason}); fly it again") from None
-    if data.attrs.get("format") != FORMAT:
-        raise InputError(f"{path}: attribute 'format' is {data.attrs.get('format')!r}; allowed: '{FORMAT}'")
     return data
+
+
+def read_configuration(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The scenario's tables and the attributes of a flight file, also of one whose signals cannot be read any more.
+
+    Raises
+    ------
+    InputError
+        If it is missing, unreadable, truncated, or no flight of this program.
+    """
+    data = _opened(Path(path))
+    if data.attrs.get("format") not in (FORMAT, OLD_FORMAT):
+        raise InputError(f"{path}: attribute 'format' is {data.attrs.get('format')!r}; allowed: '{FORMAT}'")
+    return configuration(data, path), dict(data.attrs)
 
 
 def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
@@ -97,7 +101,7 @@ def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
         If one is missing.
     """
     hint = "fly it again with 'rotorfault fly --repeat'"
-    for name in quantities():
+    for name in LoopSignals._fields:
         if name not in data.data_vars:
             raise InputError(f"{path}: signal '{name}' is missing; {hint}")
     for name in ATTRIBUTES:
@@ -113,3 +117,12 @@ def configuration(data: xr.Dataset, path: str | Path) -> dict[str, Any]:
     except (KeyError, json.JSONDecodeError) as error:
         raise InputError(f"{path}: attribute 'configuration' is missing or damaged ({error})") from None
     return tables
+
+
+def scores(data: xr.Dataset, path: str | Path) -> dict[str, Any]:
+    """The numbers that were counted in flight, as a flight file holds them; None for what has none."""
+    try:
+        numbers: dict[str, Any] = json.loads(data.attrs["scores"])
+    except (KeyError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: attribute 'scores' is missing or damaged ({error})") from None
+    return numbers

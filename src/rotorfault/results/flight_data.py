@@ -1,23 +1,24 @@
 """The records of one flight by name, as plain arrays with units and frames: what ``flight.nc`` holds.
 
-The numbers of a flight are computed from these or, all the same, from an xarray dataset. xarray takes longer to load
-than a flight takes to fly, so it is made of them only for who asks for it (`rotorfault.results.dataset`).
+Numbers are computed from these or, all the same, from an xarray dataset. xarray takes longer to load than a flight
+takes to fly, so a dataset is made of them only for callers that ask for it (`rotorfault.results.dataset`).
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple, Protocol, Self, final
 
 import numpy as np
 
 from rotorfault.engine.batch import Array
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
-from rotorfault.model.telemetry import RPY, quantities
+from rotorfault.maths.rotation import Quat
+from rotorfault.model.telemetry import RPY, Layout
 
 AXES = ["x", "y", "z"]
 ANGLES = ["roll", "pitch", "yaw"]
-FORMAT = "rotorfault-flight-1"
+COMPONENTS = ["w", "x", "y", "z"]
+FORMAT = "rotorfault-flight-2"
 
 
 class Values(Protocol):
@@ -28,7 +29,7 @@ class Values(Protocol):
         """An array, time along its first axis."""
 
 
-class Records(Protocol):
+class Signals(Protocol):
     """Signals by name, as metrics read them: `FlightData`, or an xarray dataset."""
 
     def __getitem__(self, name: str, /) -> Values:
@@ -56,6 +57,7 @@ class FlightData:
     Parameters
     ----------
     variables, coordinates : dict of Variable
+        By name.
     attrs : dict
         Attributes of the flight as a whole.
     """
@@ -83,51 +85,49 @@ class FlightData:
         return FlightData(some(self.variables), some(self.coordinates), self.attrs)
 
 
-def flight_data(signals: Array, times: Array, attributes: dict[str, Any]) -> FlightData:
+def flight_data(layout: Layout, signals: Array, times: Array, attributes: dict[str, Any]) -> FlightData:
     """One flight's records by name; nothing is copied.
 
     Parameters
     ----------
-    signals : ndarray, shape (records, rows of `Signals`)
+    layout : Layout
+        Of the rows.
+    signals : ndarray, shape (records, rows)
+        All rows of the layout.
     times : ndarray, shape (records,)
         In s.
     attributes : dict
+        Of the flight as a whole.
     """
     variables: dict[str, Variable] = {}
-    row = 0
-    for name, dims, shape, about in _layout():
-        width = int(np.prod(shape, dtype=int))
-        values = signals[:, row : row + width].reshape(len(times), *shape)
-        row += width
-        variables[name] = Variable(("time", *dims), values, dict(about))
-    coordinates = {
+    for signal in layout.signals:
+        dims, shape = _shape(signal.kind, signal.quantity.frame == RPY)
+        about = {"units": signal.quantity.unit, "long_name": signal.quantity.meaning}
+        if signal.quantity.frame:
+            about["frame"] = signal.quantity.frame
+        values = signals[:, layout.place(signal.name)].reshape(len(times), *shape)
+        variables[signal.name] = Variable(("time", *dims), values, about)
+    return FlightData(variables, _coordinates(times), attributes)
+
+
+def _coordinates(times: Array) -> dict[str, Variable]:
+    return {
         "time": Variable(("time",), times, {"units": "s", "long_name": "time since the start of the flight"}),
         "axis": Variable(("axis",), np.array(AXES), {}),
         "angle": Variable(("angle",), np.array(ANGLES), {}),
         "angle_2": Variable(("angle_2",), np.array(ANGLES), {}),
+        "component": Variable(("component",), np.array(COMPONENTS), {"long_name": "of a quaternion, scalar first"}),
         "rotor": Variable(
             ("rotor",), np.arange(1, 5), {"long_name": "1 front, 2 rear, 3 right, 4 left on a plus vehicle"}
         ),
     }
-    return FlightData(variables, coordinates, attributes)
 
 
-@lru_cache(maxsize=1)
-def _layout() -> list[tuple[str, tuple[str, ...], tuple[int, ...], dict[str, str]]]:
-    """Name, dimensions and shape besides time, and attributes of each signal."""
-    found = []
-    for name, (kind, quantity) in quantities().items():
-        dims, shape = _shape(kind, quantity.frame == RPY)
-        about = {"units": quantity.unit, "long_name": quantity.meaning}
-        if quantity.frame:
-            about["frame"] = quantity.frame
-        found.append((name, dims, shape, about))
-    return found
-
-
-def _shape(kind: type, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
+def _shape(kind: Any, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
     if kind is Vec3:
         return ("angle" if angular else "axis",), (3,)
+    if kind is Quat:
+        return ("component",), (4,)
     if kind is PerRotor:
         return ("rotor",), (4,)
     if kind is Mat3:

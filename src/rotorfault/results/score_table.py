@@ -1,29 +1,47 @@
-"""The scores of a batch as a table: one row per flight, columns named as in the summary of a single flight.
+"""The scores of a batch as a table: one row per flight, the numbers that every flight has everywhere.
 
-Definitions are those of `rotorfault.results.metrics`. Beside them: ``lowest`` [m], the least height, ``lowest_after_loss``
-[m], the same from the first true loss on; ``velocity_end`` [m/s]; ``late_position_rms`` [m] and ``late_yaw_rms``
-[rad], root mean square errors over the last half of the flight (for flights that lasted); ``onset.R`` and
-``detected.R`` [s], when rotor R first truly lost thrust and when its flag rose from then on. What a flight has no
-number for is NaN.
+Definitions are those of `rotorfault.loop.scoring`. What a flight has no number for is NaN: settling times of a lost
+flight, detections of rotors that no fault hits, landings that were not begun. Columns, with dots before the axis,
+angle or rotor:
+
+- ``outcome``, ``survived``, ``end_time`` [s];
+- ``settle_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m], ``velocity_end`` [m/s], by axis;
+- ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``, ``tilt_end``
+  [rad];
+- ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
+  flights that lasted); ``cost``;
+- ``lowest`` [m], the least height, and ``lowest_after_loss`` [m], the same from the first onset of a fault on;
+- ``control_total_variation`` [N], ``saturated_fraction``, ``given_up_fraction`` by what was cut;
+- ``onset.R`` and ``detected.R`` [s], when the first fault of rotor R begins and when its flag rose from then on;
+  ``loss_true.R``, ``loss_believed.R`` and ``loss_error.R``; ``false_alarms``;
+- ``landing.confirmed_time`` and others, where a landing may happen;
+- of each signal with a score its ``largest_NAME`` or ``NAME_fraction``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array, Batch, columns
-from rotorfault.loop.scoring import FAR, KINDS, Scores, ScoringParameters
+from rotorfault.loop.scores import ENDS, FAR, SURVIVED, Scores, ScoringParameters
+from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.records import unflatten
-from rotorfault.results.metrics import SURVIVED
+from rotorfault.model.telemetry import Signal
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "yaw")
 GIVEN_UP = ("tilt", "thrust", "yaw")
 ROTORS = ("1", "2", "3", "4")
+LANDING = (
+    "fault_time", "confirmed_time", "touch_down_time", "rotors_stopped_time", "speed", "horizontal_speed", "tilt",
+    "distance",
+)  # fmt: skip
+
+Columns = dict[str, NDArray[Any]]
 
 
 @final
@@ -33,9 +51,10 @@ class ScoreTable:
     Attributes
     ----------
     columns : dict of ndarray, shape (N,)
+        By name; see `rotorfault.results.score_table`.
     """
 
-    def __init__(self, columns: dict[str, NDArray[Any]]) -> None:
+    def __init__(self, columns: Columns) -> None:
         self.columns = columns
 
     def __len__(self) -> int:
@@ -43,6 +62,9 @@ class ScoreTable:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
 
     def row(self, index: int) -> dict[str, Any]:
         """The numbers of one flight."""
@@ -55,8 +77,14 @@ class ScoreTable:
 
     @classmethod
     def joined(cls, tables: Sequence[ScoreTable]) -> ScoreTable:
-        """Tables one after the other."""
-        return cls({name: np.concatenate([t.columns[name] for t in tables]) for name in tables[0].columns})
+        """Tables one after the other; NaN in columns that a table has not got."""
+        names = list(dict.fromkeys(name for table in tables for name in table.columns))
+        return cls(
+            {
+                name: np.concatenate([t.columns[name] if name in t else np.full(len(t), np.nan) for t in tables])
+                for name in names
+            }
+        )
 
 
 def score_table(batch: Batch, state: Array) -> ScoreTable:
@@ -69,46 +97,51 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         At the end, as a `Recording` has it.
     """
     scores: Scores = unflatten(batch.state, list(state)).scores
-    parameters: ScoringParameters = unflatten(
-        batch.parameters.scoring, list(columns(batch.parameters.scoring, batch.flights))
-    )
-    dt = np.broadcast_to(np.asarray(batch.parameters.period, dtype=float), (batch.flights,))
+    numbers = unflatten(batch.parameters, list(columns(batch.parameters, batch.flights)))
+    parameters: ScoringParameters = numbers.scoring
+    scoring, dt = batch.loop.scoring, np.asarray(numbers.period, dtype=float)
+    onsets = batch.loop.onsets(numbers.parts)
     outcome = _outcomes(batch, scores, parameters)
     survived = np.isin(outcome, SURVIVED)
+    end_time = np.where(scores.over > 0.0, scores.end, batch.steps) * dt
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 / np.where(scores.seen > 0.0, scores.seen, np.nan)
-        table: dict[str, NDArray[Any]] = {
-            "outcome": outcome,
-            "survived": survived,
-            "end_time": np.where(scores.over > 0.0, scores.end, batch.steps) * dt,
-        }
+        table: Columns = {"outcome": outcome, "survived": survived, "end_time": end_time}
         settled = [np.where(last >= batch.steps - 1, np.nan, (last + 1.0) * dt) for last in scores.last_outside]
         settled = [np.where(survived & (scores.touched == 0.0), time, np.nan) for time in settled]
         table |= _named("settle_time", (*AXES, "overall"), [*settled, np.maximum.reduce(settled)])
         table |= _named("position_mse", AXES, [x * share for x in scores.position_square])
         table |= _named("attitude_mse", ANGLES, [x * share for x in scores.attitude_square])
-        table |= _named("position_error_end", AXES, list(scores.position_error))
-        table |= _named("attitude_end", ANGLES, list(scores.attitude))
-        table |= _named("velocity_end", AXES, list(scores.velocity))
+        table |= _named("position_error_end", AXES, scores.position_error)
+        table |= _named("attitude_end", ANGLES, scores.attitude.euler())
+        table["tilt_end"] = np.arccos(np.clip(scores.attitude.z_axis().z, -1.0, 1.0))
+        table |= _named("velocity_end", AXES, scores.velocity)
         late = np.maximum(batch.steps - parameters.half, 1.0)
         lasted = scores.over == 0.0
-        table["late_position_rms"] = np.where(lasted, np.sqrt(sum(scores.late_square) / late), np.nan)
+        table["late_position_rms"] = np.where(lasted, np.sqrt(scores.late_square.sum() / late), np.nan)
         table["late_yaw_rms"] = np.where(lasted, np.sqrt(scores.late_yaw_square / late), np.nan)
-        table["cost"] = 0.5 * dt * (scores.cost - 0.5 * (scores.cost_first + scores.cost_last))
+        cost = 0.5 * dt * (scores.cost - 0.5 * (scores.cost_first + scores.cost_last))
+        table["cost"] = cost if scoring.has_cost else np.full(batch.flights, np.nan)
         table["tilt_max"] = np.arccos(np.clip(scores.cosine_least, -1.0, 1.0))
-        table |= _named("attitude_max", ANGLES, list(scores.attitude_most))
         table["lowest"] = scores.lowest
         table["lowest_after_loss"] = np.where(scores.lowest_after < FAR, scores.lowest_after, np.nan)
         table["control_total_variation"] = scores.variation
         table["saturated_fraction"] = scores.saturated * share
-        table["outside_layer_fraction"] = scores.outside_layer * share
         table |= _named("given_up_fraction", GIVEN_UP, [x * share for x in scores.given_up])
-        table |= _named("onset", ROTORS, [np.where(x < 0.0, np.nan, x * dt) for x in scores.onset])
-        table |= _named("detected", ROTORS, [np.where(x < 0.0, np.nan, x * dt) for x in scores.detected])
+        table |= _detections(scoring, scores, onsets, end_time)
         table["false_alarms"] = scores.false_alarms.astype(int)
-        table["largest_riccati_residual"] = scores.riccati_residual
-        table["riccati_guarded_fraction"] = scores.riccati_guarded * share
-    return ScoreTable(table)
+        if scoring.lands:
+            table |= _landing(scores, onsets, end_time)
+        for signal, counted in zip(scoring.counted, scores.signals, strict=True):
+            largest = signal.quantity.score == "largest"
+            table[score_name(signal)] = counted if largest else counted * share
+    return ScoreTable({name: np.broadcast_to(column, (batch.flights,)) for name, column in table.items()})
+
+
+def score_name(signal: Signal) -> str:
+    """Name of the column that holds what is counted of a signal."""
+    name = signal.name.partition(".")[2] or signal.name
+    return f"largest_{name}" if signal.quantity.score == "largest" else f"{name}_fraction"
 
 
 def _outcomes(batch: Batch, scores: Scores, parameters: ScoringParameters) -> NDArray[Any]:
@@ -124,8 +157,91 @@ def _outcomes(batch: Batch, scores: Scores, parameters: ScoringParameters) -> ND
         ]
     flown = np.where(np.logical_and.reduce(good), "settled" if constant else "tracked", "offset")
     flown = np.where(scores.rest > 0.0, "landed", flown)
-    return np.where(scores.over > 0.0, np.array(KINDS)[scores.over.astype(int)], flown)
+    return np.where(scores.over > 0.0, np.array(ENDS)[scores.over.astype(int)], flown)
 
 
-def _named(group: str, names: Sequence[str], values: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def _detections(scoring: Scoring, scores: Scores, onsets: Sequence[Any], end_time: NDArray[Any]) -> Columns:
+    """Onsets and what came of them, by rotor; NaN for faults that begin after the end, and for sound rotors."""
+    nothing = np.full(end_time.shape, np.nan)
+    table: Columns = {}
+    for rotor in ROTORS:
+        hit = int(rotor) in scoring.rotors
+        onset = np.asarray(scoring.onset(int(rotor), tuple(onsets)), dtype=float) if hit else nothing
+        begun = onset < end_time
+        table[f"onset.{rotor}"] = np.where(begun, onset, np.nan)
+        if not hit:
+            table |= {f"{name}.{rotor}": nothing for name in ("detected", "loss_true", "loss_believed", "loss_error")}
+            continue
+        detection = scores.detections[scoring.rotors.index(int(rotor))]
+        table[f"detected.{rotor}"] = np.where(detection.time < 0.0, np.nan, detection.time)
+        table[f"loss_true.{rotor}"] = np.where(begun, detection.loss_true, np.nan)
+        read = detection.read > 0.5
+        table[f"loss_believed.{rotor}"] = np.where(read, detection.loss_believed, np.nan)
+        table[f"loss_error.{rotor}"] = np.where(read, detection.loss_error, np.nan)
+    return table
+
+
+def _landing(scores: Scores, onsets: Sequence[Any], end_time: NDArray[Any]) -> Columns:
+    landing: Any = scores.landing
+    touched = landing.touched >= 0.0
+
+    def time(value: NDArray[Any]) -> NDArray[Any]:
+        return np.where(value < 0.0, np.nan, value)
+
+    first = np.minimum.reduce([np.asarray(onset, dtype=float) + 0.0 * end_time for onset in onsets or [np.inf]])
+    values = (
+        np.where((landing.begun >= 0.0) & (first < end_time), first, np.nan),
+        time(landing.begun),
+        time(landing.touched),
+        time(landing.stopped),
+        *(
+            np.where(touched, value, np.nan)
+            for value in (
+                landing.speed,
+                landing.slide,
+                np.arccos(np.clip(landing.cosine, -1.0, 1.0)),
+                landing.distance,
+            )
+        ),
+    )
+    return _named("landing", LANDING, values)
+
+
+def _named(group: str, names: Sequence[str], values: Iterable[NDArray[Any]]) -> Columns:
     return {f"{group}.{name}": value for name, value in zip(names, values, strict=True)}
+
+
+def nested(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of one flight as its summary has them: groups as tables, detections and landing by event.
+
+    Parameters
+    ----------
+    row : mapping
+        Of a `ScoreTable`.
+    """
+    summary: dict[str, Any] = {}
+    detection = ("onset", "detected", "loss_true", "loss_believed", "loss_error")
+    for name, value in row.items():
+        group, _, member = name.partition(".")
+        if group in detection or group == "landing":
+            continue
+        if member:
+            summary.setdefault(group, {})[member] = value
+        else:
+            summary[name] = value
+    summary["detections"] = [
+        {
+            "rotor": int(rotor),
+            "true_time": row[f"onset.{rotor}"],
+            "detected_time": row[f"detected.{rotor}"],
+            "delay": row[f"detected.{rotor}"] - row[f"onset.{rotor}"],
+            "loss_true": row[f"loss_true.{rotor}"],
+            "loss_estimated": row[f"loss_believed.{rotor}"],
+            "loss_error": row[f"loss_error.{rotor}"],
+        }
+        for rotor in ROTORS
+        if np.isfinite(row[f"onset.{rotor}"])
+    ]
+    begun = np.isfinite(row.get("landing.confirmed_time", np.nan))
+    summary["landing"] = {name: row[f"landing.{name}"] for name in LANDING} if begun else None
+    return summary

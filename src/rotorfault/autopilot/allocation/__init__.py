@@ -1,11 +1,11 @@
 """Control allocation: from the wrench that the controller demands to one thrust command per rotor.
 
-Importing the package registers every allocator, so that `ALLOCATORS` is complete.
+Importing the package registers every allocator, so that the registry is complete.
 """
 
 from rotorfault.autopilot.allocation.effectiveness import Effectiveness
 from rotorfault.autopilot.allocation.nominal import Nominal
 from rotorfault.autopilot.allocation.paper_rule import PaperRule
-from rotorfault.autopilot.allocation.protocol import ALLOCATORS, Allocator
+from rotorfault.autopilot.allocation.protocol import ALLOCATION, AllocationInputs, Allocator
 
-__all__ = ["ALLOCATORS", "Allocator", "Effectiveness", "Nominal", "PaperRule"]
+__all__ = ["ALLOCATION", "AllocationInputs", "Allocator", "Effectiveness", "Nominal", "PaperRule"]

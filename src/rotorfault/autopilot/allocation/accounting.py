@@ -12,15 +12,11 @@ from __future__ import annotations
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, either, less_equal, negated
 from rotorfault.model.mixer import pair_demand
+from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
 
 TOLERANCE = 1e-9  # of the largest rotor command: below it a difference is rounding
-
-
-def believed_effect(vehicle: Vehicle, diagnosis: Diagnosis) -> PerRotor:
-    """Believed steady thrust per commanded thrust of each rotor, (1 - loss_i) k."""
-    return diagnosis.loss.map(lambda loss: (1.0 - loss) * vehicle.rotor_gain)
 
 
 def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: PerRotor) -> Allocation:
@@ -42,7 +38,7 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
         An axis counts as given up when more than `TOLERANCE` of the largest rotor command is missing or too much,
         measured in rotor thrust; NaN counts as given up.
     """
-    given = wrench_of(vehicle, command * believed_effect(vehicle, diagnosis))
+    given = wrench_of(vehicle, command * effect_of(vehicle, diagnosis.loss))
     unallocated = Wrench(wrench.thrust - given.thrust, wrench.torque_B - given.torque_B)
     missing = pair_demand(vehicle, unallocated)
     tolerance = TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
@@ -59,3 +55,20 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
             beyond(missing.S12 - missing.S34),
         ),
     )
+
+
+def direct(vehicle: Vehicle, diagnosis: Diagnosis, command: PerRotor) -> tuple[Wrench, Allocation]:
+    """The wrench that commands of a controller are believed to give, and their report: nothing is left out of it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    diagnosis : Diagnosis
+        Only the loss is used.
+    command : PerRotor
+        In N; put within the rotor limits.
+    """
+    command = limited(vehicle, command)
+    wrench = wrench_of(vehicle, command * effect_of(vehicle, diagnosis.loss))
+    return wrench, account(vehicle, wrench, diagnosis, command)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.model.motion import effect_of
 from rotorfault.model.vehicle import Vehicle
 
 HOVER_RESERVE = 1.2  # of the weight: thrust for which yaw is given up where it cannot be had in balance
@@ -32,7 +33,7 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
         In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
         this as there is with yaw given up.
     """
-    most = loss.map(lambda x: (1.0 - x) * (vehicle.rotor_gain * vehicle.thrust_max))
+    most = effect_of(vehicle, loss) * vehicle.thrust_max
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
     with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
     return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

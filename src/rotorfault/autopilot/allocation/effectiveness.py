@@ -28,23 +28,32 @@ what it still gives there, lo_i, is its whole interval. So nothing is ever divid
 
 from __future__ import annotations
 
-from typing import final
+from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.allocation.accounting import account, believed_effect
-from rotorfault.autopilot.allocation.protocol import ALLOCATORS
+from rotorfault.autopilot.allocation.accounting import account
+from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, clip, less, maximum, minimum, select
+from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import PairDemand, pair_demand, rotor_thrusts
+from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
+from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
 
 
-@ALLOCATORS.register("effectiveness")
+class EffectivenessParameters(NamedTuple):
+    """Numbers of the allocator."""
+
+    effectiveness_min: Scalar  # 1
+
+
+@register("effectiveness")
 @final
-class Effectiveness:
+class Effectiveness(Allocator[Nothing, EffectivenessParameters]):
     """Believed effectiveness and rotor limits; keeps tilt before thrust before yaw, and names what it gives up."""
 
     class Settings(Strict):
@@ -54,24 +63,43 @@ class Effectiveness:
             default=0.05, gt=0.0, lt=1.0, description="Effectiveness below which a rotor counts as dead [1]"
         )
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+    def parameters(self, context: Context) -> EffectivenessParameters:
+        """The effectiveness below which a rotor counts as dead."""
+        return EffectivenessParameters(self.settings.effectiveness_min)
 
-    def allocate(self, vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis) -> Allocation:
-        """Commands for a demanded wrench; see `Allocator.allocate`."""
-        effect = believed_effect(vehicle, diagnosis)
-        dead = diagnosis.loss.map(lambda loss: less(1.0 - loss, self.settings.effectiveness_min))
-        low = effect * vehicle.thrust_min
-        high = dead.map(select, low, effect * vehicle.thrust_max)
+    def step(
+        self, memory: Nothing, inputs: AllocationInputs, parameters: EffectivenessParameters, dt: Scalar
+    ) -> tuple[Nothing, Allocation, Record]:
+        """Commands for a demanded wrench."""
+        wrench, diagnosis, vehicle, _ = inputs
+        return memory, allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min), Nothing()
 
-        thrust = rotor_thrusts(attainable_nearest(pair_demand(vehicle, wrench), low, high)).map(clip, low, high)
 
-        # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
-        divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
-        command = ((thrust - low) / divisor + vehicle.thrust_min).map(
-            lambda c: clip(c, vehicle.thrust_min, vehicle.thrust_max)
-        )
-        return account(vehicle, wrench, diagnosis, command)
+def allocated(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiveness_min: Scalar) -> Allocation:
+    """Commands for a demanded wrench, in strict order: tilt, thrust, yaw.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed, with two opposite pairs of rotors.
+    wrench : Wrench
+        Demanded thrust [N] and torque [N m, body axes].
+    diagnosis : Diagnosis
+        Only the loss is used.
+    effectiveness_min : scalar
+        Below it a rotor counts as dead.
+    """
+    effect = effect_of(vehicle, diagnosis.loss)
+    dead = diagnosis.loss.map(lambda loss: less(1.0 - loss, effectiveness_min))
+    low = effect * vehicle.thrust_min
+    high = dead.map(select, low, effect * vehicle.thrust_max)
+
+    thrust = rotor_thrusts(attainable_nearest(pair_demand(vehicle, wrench), low, high)).map(clip, low, high)
+
+    # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
+    divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
+    command = limited(vehicle, (thrust - low) / divisor + vehicle.thrust_min)
+    return account(vehicle, wrench, diagnosis, command)
 
 
 def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor) -> PairDemand:

@@ -5,30 +5,28 @@ from __future__ import annotations
 from typing import final
 
 from rotorfault.autopilot.allocation.accounting import account
-from rotorfault.autopilot.allocation.protocol import ALLOCATORS
-from rotorfault.base.config import Strict
-from rotorfault.maths.scalar import clip
+from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.block import Nothing, Record
 from rotorfault.model.mixer import nominal_inverse
-from rotorfault.model.signals import Allocation, Diagnosis, Wrench
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.motion import limited
+from rotorfault.model.signals import Allocation
+from rotorfault.model.slot import register
 
 
-@ALLOCATORS.register("nominal")
+@register("nominal")
 @final
-class Nominal:
+class Nominal(Allocator[Nothing, Nothing]):
     """Inverse for sound rotors, each command clipped by itself; ignores the diagnosis.
 
     The diagnosis enters the report only: what the commands leave unallocated is told as the autopilot believes it.
     """
 
-    class Settings(Strict):
-        """Nothing to set."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def allocate(self, vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis) -> Allocation:
-        """Commands for a demanded wrench; see `Allocator.allocate`."""
+    def step(
+        self, memory: Nothing, inputs: AllocationInputs, parameters: Nothing, dt: Scalar
+    ) -> tuple[Nothing, Allocation, Record]:
+        """Commands for a demanded wrench."""
+        wrench, diagnosis, vehicle, _ = inputs
         thrust = nominal_inverse(vehicle, wrench)
-        command = thrust.map(lambda f: clip(f / vehicle.rotor_gain, vehicle.thrust_min, vehicle.thrust_max))
-        return account(vehicle, wrench, diagnosis, command)
+        command = limited(vehicle, thrust / vehicle.rotor_gain)
+        return memory, account(vehicle, wrench, diagnosis, command), Nothing()

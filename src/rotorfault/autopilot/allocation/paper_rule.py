@@ -22,25 +22,33 @@ controller has to make up for what is missing), the sum is off by the moment, an
 
 from __future__ import annotations
 
-from typing import final
+from typing import NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.autopilot.allocation.accounting import account
-from rotorfault.autopilot.allocation.effectiveness import Effectiveness
-from rotorfault.autopilot.allocation.protocol import ALLOCATORS
+from rotorfault.autopilot.allocation.effectiveness import Effectiveness, allocated
+from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, both, clip, either, select
+from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import PairDemand, pair_demand
-from rotorfault.model.signals import Allocation, Diagnosis, Wrench
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.motion import limited
+from rotorfault.model.signals import Allocation, Diagnosis
+from rotorfault.model.slot import register
 
 
-@ALLOCATORS.register("paper_rule")
+class PaperRuleParameters(NamedTuple):
+    """Numbers of the fallback."""
+
+    effectiveness_min: Scalar  # 1
+
+
+@register("paper_rule")
 @final
-class PaperRule:
+class PaperRule(Allocator[Nothing, PaperRuleParameters]):
     """The paper's rule (41)-(44): yaw given up, the flagged rotor's partner carries the whole moment."""
 
     class Settings(Strict):
@@ -51,19 +59,23 @@ class PaperRule:
             description="Settings of the effectiveness allocator, which takes two faults on one axis [-]",
         )
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self._fallback = Effectiveness(settings.fallback)
+    def parameters(self, context: Context) -> PaperRuleParameters:
+        """Numbers of the fallback."""
+        return PaperRuleParameters(self.settings.fallback.effectiveness_min)
 
-    def allocate(self, vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis) -> Allocation:
-        """Commands for a demanded wrench; see `Allocator.allocate`."""
+    def step(
+        self, memory: Nothing, inputs: AllocationInputs, parameters: PaperRuleParameters, dt: Scalar
+    ) -> tuple[Nothing, Allocation, Record]:
+        """Commands for a demanded wrench."""
+        wrench, diagnosis, vehicle, _ = inputs
         thrust = rule_thrusts(pair_demand(vehicle, wrench), diagnosis.flagged)
-        command = thrust.map(lambda f: clip(f / vehicle.rotor_gain, vehicle.thrust_min, vehicle.thrust_max))
-        return select_record(
+        command = limited(vehicle, thrust / vehicle.rotor_gain)
+        allocation = select_record(
             falls_back(diagnosis),
-            self._fallback.allocate(vehicle, wrench, diagnosis),
+            allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min),
             account(vehicle, wrench, diagnosis, command),
         )
+        return memory, allocation, Nothing()
 
 
 def falls_back(diagnosis: Diagnosis) -> Scalar:

@@ -1,46 +1,45 @@
-"""What an allocator is, and the registry of those that exist."""
+"""What an allocator is, and the slot of those that exist."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import NamedTuple
 
-from rotorfault.base.config import Strict
-from rotorfault.base.registry import Registry
+from rotorfault.autopilot.instant import Instant
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
+from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 
 
-class Allocator(Protocol):
-    """Turns a demanded wrench into rotor commands. Memoryless: the same inputs give the same commands.
+class AllocationInputs(NamedTuple):
+    """All that an allocator may use at one sampling instant."""
 
-    A class that satisfies it is final, holds its configuration class as `Settings` (a `Strict` whose defaults are
-    usable; see `settings_class`), and says in the first line of its docstring what it does.
-    """
-
-    def __init__(self, settings: Any) -> None: ...
-
-    def allocate(self, vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis) -> Allocation:
-        """Commands for a demanded wrench.
-
-        Parameters
-        ----------
-        vehicle : Vehicle
-            The vehicle as the autopilot believes it to be, with two opposite pairs of rotors (see `mixer`).
-        wrench : Wrench
-            Demanded thrust [N] and torque [N m, body axes].
-        diagnosis : Diagnosis
-            Belief about the rotors.
-
-        Returns
-        -------
-        Allocation
-            Commands [N] within the rotor limits; the wrench that they leave unallocated; what was given up.
-        """
+    wrench: Wrench  # demanded thrust [N] and torque [N m, body axes]
+    diagnosis: Diagnosis  # believed
+    vehicle: Vehicle  # belief, with two opposite pairs of rotors (see `rotorfault.model.mixer`)
+    command: PerRotor  # N, sent at the last instant
 
 
-ALLOCATORS: Registry[type[Allocator]] = Registry("allocator")
+class Allocator(Block[AllocationInputs, Allocation, MemoryT, ParametersT]):
+    """Turns a demanded wrench into rotor commands within the limits, and says what it could not give."""
 
 
-def settings_class(allocator: type[Allocator]) -> type[Strict]:
-    """The configuration class of an allocator. A function, for a type checker sees no nested class in a protocol."""
-    return allocator.Settings  # type: ignore[attr-defined, no-any-return]
+def _inputs(instant: Instant) -> AllocationInputs:
+    wrench = instant.demand
+    if isinstance(wrench, PerRotor):
+        raise InputError("a controller that commands the rotors itself needs no allocation")
+    return AllocationInputs(wrench, instant.decision.diagnosis, instant.vehicle, instant.past.command.thrust)
+
+
+ALLOCATION = Slot(
+    "allocation",
+    Allocator,
+    "belief",
+    "control allocation: from the demanded wrench to rotor commands",
+    "allocators",
+    sort="allocator",
+    default="effectiveness",
+    inputs=_inputs,
+)

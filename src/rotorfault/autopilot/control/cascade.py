@@ -22,24 +22,30 @@ attitude reference is level, thrust and torques still pass through the rotors.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, create_model
 
 from rotorfault.autopilot.control.protocol import (
-    CONTROLLERS,
+    CONTROLLER,
     ControlInputs,
+    Controller,
     ControlOutput,
-    ControlTelemetry,
     Law,
-    Prediction,
+    LawOutput,
+    RiccatiSignals,
+    SlidingSignals,
     TrackingError,
 )
 from rotorfault.autopilot.control.sdre import gyroscopic_drift
+from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, atan2, clip, cos, exp, maximum, minimum, sin, sqrt, wrap_angle
-from rotorfault.model.signals import Measurement, Reference, Wrench
+from rotorfault.maths.scalar import Scalar, any_of, atan2, clip, exp, maximum, minimum, sqrt, wrap_angle
+from rotorfault.model.block import Context, Record
+from rotorfault.model.motion import drag_acceleration
+from rotorfault.model.signals import Estimate, Reference, Wrench
+from rotorfault.model.telemetry import RPY, Q, W
 from rotorfault.model.vehicle import Vehicle
 
 
@@ -88,7 +94,7 @@ class AttitudeReference(NamedTuple):
 
 
 class CascadeMemory(NamedTuple):
-    """Memory of the cascade."""
+    """Memory of the cascade: of the law, and of its command filter."""
 
     position: Any
     attitude: Any
@@ -107,9 +113,9 @@ def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: Ca
     return Vec3(f_W.x * scale, f_W.y * scale, f_z)
 
 
-def attitude_for(f_W: Vec3, yaw: Scalar, yaw_ref: Scalar) -> Vec3:
+def attitude_for(f_W: Vec3, cos_yaw: Scalar, sin_yaw: Scalar, yaw_ref: Scalar) -> Vec3:
     """Attitude in rad whose thrust axis points along f, roll and pitch taken at the present yaw."""
-    c, s = cos(yaw), sin(yaw)
+    c, s = cos_yaw, sin_yaw
     forward, left = c * f_W.x + s * f_W.y, c * f_W.y - s * f_W.x
     return Vec3(
         atan2(-left, sqrt(forward * forward + f_W.z * f_W.z)),
@@ -133,18 +139,40 @@ def filtered(
     return AttitudeReference(reference.attitude + after - gap, rate), acceleration
 
 
-class Cascade:
-    """A controller made of a law: position loop, command filter, attitude loop."""
+class CascadeSignals(NamedTuple):
+    """What every law in the cascade records."""
 
-    def __init__(self, law: Law, settings: CascadeSettings) -> None:
+    attitude_demand: Annotated[Vec3, Q("rad", RPY, "attitude that the position loop asks for")]
+    attitude_command: Annotated[Vec3, Q("rad", RPY, "demand after the command filter; tracked by the attitude loop")]
+    virtual_position: Annotated[Vec3, Q("m/s^2", W, "commanded acceleration less gravity and feed-forward, limited")]
+    virtual_attitude: Annotated[Vec3, Q("rad/s^2", RPY, "commanded angular acceleration less feed-forward")]
+    gain_position: Annotated[Vec3, Q("1/s^2", W, "gain on the position error")]
+    gain_velocity: Annotated[Vec3, Q("1/s", W, "gain on the velocity error")]
+    gain_angle: Annotated[Mat3, Q("1/s^2", RPY, "gain matrix on the attitude error")]
+    gain_rate: Annotated[Mat3, Q("1/s", RPY, "gain matrix on the rate error")]
+
+
+class Cascade(Controller[CascadeMemory, CascadeParameters]):
+    """A controller made of a law: position loop, command filter, attitude loop.
+
+    Parameters
+    ----------
+    law : Law
+    settings : CascadeSettings
+    telemetry : type of NamedTuple
+        What is recorded; see `CascadeKind`.
+    """
+
+    def __init__(self, law: Law[Any], settings: CascadeSettings, telemetry: type[Record]) -> None:
         self.law = law
         self.settings = settings
+        self.Telemetry = telemetry  # type: ignore[misc]  # of the law's kind
 
-    def parameters(self, vehicle: Vehicle, period: float) -> CascadeParameters:
-        """Numbers of the controller for a believed vehicle and a sampling period in s."""
+    def parameters(self, context: Context) -> CascadeParameters:
+        """Numbers of the law and of the cascade around it."""
         s = self.settings
         return CascadeParameters(
-            self.law.parameters(vehicle, period),
+            self.law.parameters(context),
             math.tan(s.tilt_max),
             s.thrust_share,
             s.fall_share,
@@ -153,32 +181,33 @@ class Cascade:
             s.horizontal_lag,
         )
 
-    def initial(self, measurement: Measurement, reference: Reference, parameters: CascadeParameters) -> CascadeMemory:
-        """Memory before the first step; the command filter starts at the measured attitude."""
-        level = zeros()
-        start = AttitudeReference(level if self.settings.six_inputs else measurement.attitude, level)
+    def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
+        """Memory before the first step; the command filter starts at the estimated attitude."""
+        estimate, level = inputs.estimate, zeros()
+        angles = estimate.q_WB.euler()
+        start = AttitudeReference(level if self.settings.six_inputs else angles, level)
         nothing = Prediction(level, level)
         still = Mat3.diagonal(level)
-        position = _position_error(measurement, reference, nothing, level)
-        attitude = _attitude_error(measurement, start, level, nothing, still, level)
+        position = _position_error(estimate, inputs.reference, nothing, level)
+        attitude = _attitude_error(angles, estimate.omega_B, start, level, nothing, still, level)
         law = self.law.initial(position, attitude, parameters.law)
         return CascadeMemory(law.position, law.attitude, start)
 
     def step(
         self, memory: CascadeMemory, inputs: ControlInputs, parameters: CascadeParameters, dt: Scalar
-    ) -> tuple[CascadeMemory, ControlOutput]:
+    ) -> tuple[CascadeMemory, ControlOutput, Record]:
         """One sampling instant."""
-        measurement, reference, vehicle = inputs.measurement, inputs.reference, inputs.vehicle
+        estimate, reference, vehicle = inputs.estimate, inputs.reference, inputs.vehicle
         six_inputs = self.settings.six_inputs
         w0 = vehicle.rotor_bandwidth
-        drag_W = measurement.v_W * (vehicle.linear_drag / vehicle.mass)
+        angles, R_WB = estimate.q_WB.euler(), estimate.q_WB.matrix()
 
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
-        position = _position_error(measurement, reference, inputs.prediction, Vec3(lag, lag, w0))
+        position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
-        wanted = reference.a_W + outer.u + drag_W + gravity_W
+        wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
         force_W = limited_force(wanted, inputs.thrust_available, vehicle, parameters)
 
         # Attitude demand and its filter.
@@ -186,48 +215,65 @@ class Cascade:
             demand, direct = Vec3(0.0, 0.0, reference.yaw), Vec3(wanted.x, wanted.y, 0.0)
             given = Vec3(outer.u.x, outer.u.y, force_W.z - wanted.z + outer.u.z)
         else:
-            demand, direct = attitude_for(force_W, measurement.attitude.z, reference.yaw), zeros()
+            # Of a body axis that points straight up there is no heading; the floor keeps it a number.
+            level = 1.0 / maximum(sqrt(R_WB.xx * R_WB.xx + R_WB.yx * R_WB.yx), 1e-15)
+            demand, direct = attitude_for(force_W, R_WB.xx * level, R_WB.yx * level, reference.yaw), zeros()
             given = outer.u + force_W - wanted
         following, acceleration = filtered(memory.reference, demand, parameters.filter_bandwidth, dt)
 
         # Attitude loop: torque.
-        drift = gyroscopic_drift(vehicle, measurement.omega_B, inputs.residual_speed)
+        drift = gyroscopic_drift(vehicle, estimate.omega_B, inputs.residual_speed)
         attitude = _attitude_error(
-            measurement, memory.reference, acceleration, inputs.prediction, drift, Vec3(w0, w0, w0)
+            angles,
+            estimate.omega_B,
+            memory.reference,
+            acceleration,
+            inputs.prediction,
+            drift,
+            Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
         torque_B = (inner.u + attitude.feed_forward).times(vehicle.inertia)
 
-        level = cos(measurement.attitude.x) * cos(measurement.attitude.y)
-        thrust = vehicle.mass * force_W.z / maximum(level, parameters.cos_min)
-        telemetry = ControlTelemetry(
+        thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
+        own = CascadeSignals(
             attitude_demand=demand,
             attitude_command=memory.reference.attitude,
-            virtual_position_W=given,
+            virtual_position=given,
             virtual_attitude=inner.u,
-            sigma_position=outer.sigma,
-            sigma_attitude=inner.sigma,
-            lyapunov=(outer.sigma.dot(outer.sigma) + inner.sigma.dot(inner.sigma)) * 0.5,
             gain_position=outer.gain_e.diag,
             gain_velocity=outer.gain_rate.diag,
             gain_angle=inner.gain_e,
             gain_rate=inner.gain_rate,
-            riccati_residual=inner.riccati_residual,
-            riccati_guarded=inner.riccati_guarded,
-            outside_position=outer.outside,
-            outside_attitude=inner.outside,
         )
-        output = ControlOutput(Wrench(thrust, torque_B), direct, telemetry)
-        return CascadeMemory(position_memory, attitude_memory, following), output
+        output = ControlOutput(Wrench(thrust, torque_B), direct)
+        recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
+        return CascadeMemory(position_memory, attitude_memory, following), output, self.Telemetry(*own, *recorded)
+
+
+def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:
+    """What a law has of one sort of signals."""
+    if kind is SlidingSignals:
+        sigma, turn = position.sigma, attitude.sigma
+        outside = [*position.outside, *attitude.outside]
+        return SlidingSignals(
+            sigma_position=sigma,
+            sigma_attitude=turn,
+            outside_layer_position=position.outside,
+            outside_layer_attitude=attitude.outside,
+            outside_layer=any_of(outside),
+            lyapunov=(sigma.dot(sigma) + turn.dot(turn)) * 0.5,
+        )
+    return RiccatiSignals(attitude.riccati_residual, attitude.riccati_guarded)
 
 
 def _position_error(
-    measurement: Measurement, reference: Reference, prediction: Prediction, actuator: Vec3
+    estimate: Estimate, reference: Reference, prediction: Prediction, actuator: Vec3
 ) -> TrackingError:
     return TrackingError(
-        e=measurement.p_W - reference.p_W,
-        e_dot=measurement.v_W - reference.v_W,
-        rate=measurement.v_W,
+        e=estimate.p_W - reference.p_W,
+        e_dot=estimate.v_W - reference.v_W,
+        rate=estimate.v_W,
         predicted=prediction.delta_v_W,
         feed_forward=reference.a_W,
         drift=Mat3.diagonal(zeros()),
@@ -236,18 +282,19 @@ def _position_error(
 
 
 def _attitude_error(
-    measurement: Measurement,
+    angles: Vec3,
+    omega_B: Vec3,
     reference: AttitudeReference,
     acceleration: Vec3,
     prediction: Prediction,
     drift: Mat3,
     actuator: Vec3,
 ) -> TrackingError:
-    gap = measurement.attitude - reference.attitude
+    gap = angles - reference.attitude
     return TrackingError(
         e=Vec3(gap.x, gap.y, wrap_angle(gap.z)),
-        e_dot=measurement.omega_B - reference.rate,
-        rate=measurement.omega_B,
+        e_dot=omega_B - reference.rate,
+        rate=omega_B,
         predicted=prediction.delta_omega_B,
         feed_forward=acceleration - drift @ reference.rate,
         drift=drift,
@@ -260,26 +307,46 @@ class CascadeKind:
 
     Parameters
     ----------
-    law : class
-        Satisfies `rotorfault.autopilot.control.protocol.Law`; has `Settings` and takes them in its constructor.
+    name : str
+        Of the law.
+    law : type of Law
     """
 
-    def __init__(self, name: str, law: Any) -> None:
+    def __init__(self, name: str, law: type[Law[Any]]) -> None:
         self.law = law
         self.__doc__ = law.__doc__
-        self.Settings: Any = create_model(
+        self.slot = CONTROLLER
+        self._settings: type[Strict] = create_model(
             f"{name.capitalize()}Controller",
             __base__=Strict,
             __doc__=f"Settings of the controller {name}.",
             law=(law.Settings, Field(default=law.Settings(), description="the control law")),
             cascade=(CascadeSettings, Field(default=CascadeSettings(), description=CascadeSettings.__doc__)),
         )
+        fields = [
+            (field, hint)
+            for kind in (CascadeSignals, *law.records)
+            for field, hint in get_type_hints(kind, include_extras=True).items()
+        ]
+        self.Telemetry = cast("type[Record]", _record(f"{name.capitalize()}Signals", fields))
 
-    def __call__(self, settings: Any) -> Cascade:
+    @property
+    def Settings(self) -> type[Strict]:
+        """Of the law and of the cascade."""
+        return self._settings
+
+    def __call__(self, settings: Any, /) -> Cascade:
         """Make the controller."""
-        return Cascade(self.law(settings.law), settings.cascade)
+        return Cascade(self.law(settings.law), settings.cascade, self.Telemetry)
 
 
-def register_law(name: str, law: Any) -> None:
+def _record(name: str, fields: list[tuple[str, Any]]) -> Any:
+    """A NamedTuple type of fields that are known only when a law is registered."""
+    record = NamedTuple(name, fields)  # type: ignore[misc]
+    record.__module__ = __name__
+    return record
+
+
+def register_law(name: str, law: type[Law[Any]]) -> None:
     """Make a law available as a controller under a name, with the cascade around it."""
-    CONTROLLERS.register(name)(CascadeKind(name, law))
+    CONTROLLER.registry.add(name, CascadeKind(name, law))

@@ -31,7 +31,8 @@ from pydantic import Field, field_validator
 from rotorfault.autopilot.control.protocol import TrackingError
 from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Vec3, zeros
-from rotorfault.maths.scalar import Scalar, absolute, exp, greater, saturate, sign, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, greater, saturate, sign, sqrt
+from rotorfault.model.motion import lag_held
 
 Nominal = Literal["achieved", "demanded"]
 Switching = Literal["smooth", "discontinuous"]
@@ -108,12 +109,11 @@ def commit(
     hold; `mean` is its output averaged over the period.
     """
     entering = switching if nominal == "achieved" else nominal_acceleration
-    decay = actuator.map(lambda w: exp(-w * dt))
-    gap = memory.lagged - entering
-    mean = entering + gap.times(decay.map(lambda d: 1.0 - d).over(actuator * dt))
-    return memory._replace(
-        pending=(-mean if nominal == "achieved" else mean) * dt, lagged=entering + gap.times(decay)
+    ends, means = zip(
+        *(lag_held(*values, dt) for values in zip(memory.lagged, entering, actuator, strict=True)), strict=True
     )
+    mean = Vec3.of(means)
+    return memory._replace(pending=(-mean if nominal == "achieved" else mean) * dt, lagged=Vec3.of(ends))
 
 
 def switching_input(sigma: Vec3, error_norm: Scalar, gains: SwitchingGains, form: Switching) -> Vec3:

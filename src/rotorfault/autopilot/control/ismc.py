@@ -26,11 +26,11 @@ from rotorfault.autopilot.control.integral_sliding import (
     outside_layer,
     start,
 )
-from rotorfault.autopilot.control.protocol import LawOutput, TrackingError
+from rotorfault.autopilot.control.protocol import Law, LawMemory, LawOutput, SlidingSignals, TrackingError
 from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Context
 
 
 class HurwitzGain(Strict):
@@ -81,22 +81,13 @@ class IsmcParameters(NamedTuple):
     attitude: SwitchingGains
 
 
-class IsmcMemory(NamedTuple):
-    """Sliding surfaces of the two groups of axes."""
-
-    position: Surface
-    attitude: Surface
-
-
-class Ismc:
+class Ismc(Law[IsmcParameters]):
     """Integral sliding mode control with a constant Hurwitz gain, (10)-(15)."""
 
     Settings = IsmcSettings
+    records = (SlidingSignals,)
 
-    def __init__(self, settings: IsmcSettings) -> None:
-        self.settings = settings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> IsmcParameters:
+    def parameters(self, context: Context) -> IsmcParameters:
         """Numbers of the law."""
         s = self.settings
         return IsmcParameters(
@@ -108,9 +99,9 @@ class Ismc:
             s.attitude.gains(),
         )
 
-    def initial(self, position: TrackingError, attitude: TrackingError, parameters: IsmcParameters) -> IsmcMemory:
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: IsmcParameters) -> LawMemory:
         """sigma(0) = 0 on all axes."""
-        return IsmcMemory(start(position.rate), start(attitude.rate))
+        return LawMemory(start(position.rate), start(attitude.rate))
 
     def position(
         self, memory: Surface, error: TrackingError, parameters: IsmcParameters, dt: Scalar
@@ -136,6 +127,4 @@ class Ismc:
         surface, u, sigma = add_switching(
             memory, error, feedback, gains, self.settings.nominal, self.settings.switching, dt
         )
-        return surface, LawOutput(
-            u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0, outside_layer(sigma, gains)
-        )
+        return surface, LawOutput(u, Mat3.diagonal(k1), Mat3.diagonal(k2), sigma, outside_layer(sigma, gains))

@@ -1,88 +1,84 @@
 """What a controller is: the interface that every control law and every user's controller keeps.
 
-A *controller* turns measurement, reference and belief into a wrench. A *law* is smaller: it turns the tracking
-error of three axes into three virtual accelerations; `rotorfault.autopilot.control.cascade` makes a controller of it.
+A *controller* turns estimate, reference and belief into a wrench, or into commands of the rotors. A *law* is smaller:
+it turns the tracking error of three axes into three virtual accelerations; `rotorfault.autopilot.control.cascade`
+makes a controller of it.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, ClassVar, Generic, NamedTuple
 
-from rotorfault.base.registry import Registry
-from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.autopilot.allocation.available import thrust_available
+from rotorfault.autopilot.instant import Instant
+from rotorfault.autopilot.prediction import Prediction
+from rotorfault.autopilot.presets import presets
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement, Reference, Wrench
+from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, Record
+from rotorfault.model.signals import Diagnosis, Estimate, Reference, Wrench
+from rotorfault.model.slot import Slot
+from rotorfault.model.telemetry import NO_FRAME, Q
 from rotorfault.model.vehicle import Vehicle
-
-
-class Prediction(NamedTuple):
-    """Velocity changes over the last sampling period that the believed model explains; zero at the first step."""
-
-    delta_v_W: Vec3  # m/s
-    delta_omega_B: Vec3  # rad/s
 
 
 class ControlInputs(NamedTuple):
     """All that a controller may use at one sampling instant."""
 
-    measurement: Measurement
+    estimate: Estimate
     reference: Reference
     vehicle: Vehicle  # the autopilot's belief, not the truth
+    diagnosis: Diagnosis  # what is believed of the rotors
+    command: PerRotor  # N, sent at the last instant
+    expected_thrust: PerRotor  # N: of sound rotors now; of the believed ones it is times 1 - loss
     prediction: Prediction
     residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
 
 
-class ControlTelemetry(NamedTuple):
-    """What a controller reports for the record; zero where a law has no such quantity."""
+class ControlOutput(NamedTuple):
+    """What a controller asks for."""
 
-    attitude_demand: Vec3  # rad: attitude that the position loop asks for
-    attitude_command: Vec3  # rad: the same after the command filter; the attitude loop tracks it
-    virtual_position_W: Vec3  # m/s^2: commanded acceleration less gravity and feed-forward, after limits
-    virtual_attitude: Vec3  # rad/s^2: commanded angular acceleration
-    sigma_position: Vec3  # sliding variable, unit of velocity times the law's weight
-    sigma_attitude: Vec3
-    lyapunov: Scalar  # V = sigma^T sigma / 2
-    gain_position: Vec3  # 1/s^2, diagonal position gain
-    gain_velocity: Vec3  # 1/s, diagonal velocity gain
-    gain_angle: Mat3  # 1/s^2
-    gain_rate: Mat3  # 1/s
-    riccati_residual: Scalar  # relative residual of (22) for the attitude block
-    riccati_guarded: Scalar  # 1 where the guaranteed gain had to be flown
-    outside_position: Vec3 = zeros()  # 1 on axes whose sliding variable is outside the boundary layer
-    outside_attitude: Vec3 = zeros()
+    demand: Wrench | PerRotor  # a wrench for the allocation, or commands of the rotors in N
+    # Unphysical: acts on x and y directly; zero but for the option `six_inputs`.
+    direct_acceleration_W: Vec3 = zeros()  # m/s^2
 
 
-def no_telemetry() -> ControlTelemetry:
-    """Telemetry of a controller that reports nothing but its wrench."""
-    nothing, none = zeros(), Mat3.diagonal(zeros())
-    return ControlTelemetry(
-        nothing, nothing, nothing, nothing, nothing, nothing, 0.0, nothing, nothing, none, none, 0.0, 0.0
+class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):
+    """Turns estimate, reference and belief into a wrench, or into commands of the rotors.
+
+    Signals named ``gain_position``, ``gain_velocity`` (Vec3), ``gain_angle`` and ``gain_rate`` (Mat3) are taken for
+    the gains of u = -k1 e - k2 e_dot by the check of sampling; ``virtual_position`` (Vec3, m/s^2) is the commanded
+    acceleration less gravity and feed-forward, without which a flight has no cost J.
+    """
+
+
+def _inputs(instant: Instant) -> ControlInputs:
+    believed = instant.decision.diagnosis
+    return ControlInputs(
+        estimate=instant.estimate,
+        reference=instant.decision.reference,
+        vehicle=instant.vehicle,
+        diagnosis=believed,
+        command=instant.past.command.thrust,
+        expected_thrust=instant.expectation.thrust,
+        prediction=instant.prediction,
+        residual_speed=instant.expectation.residual_speed,
+        thrust_available=thrust_available(instant.vehicle, believed.loss),
     )
 
 
-class ControlOutput(NamedTuple):
-    """Wrench demanded, and what to record."""
-
-    wrench: Wrench
-    direct_acceleration_W: Vec3  # m/s^2, zero but for the unphysical option `six_inputs`
-    telemetry: ControlTelemetry
-
-
-class Controller(Protocol):
-    """A block: static choices in the object, numbers in `parameters`, memory passed through `step`."""
-
-    def parameters(self, vehicle: Vehicle, period: float) -> Any:
-        """Numbers of the controller as a record, for a believed vehicle and a sampling period in s."""
-
-    def initial(self, measurement: Measurement, reference: Reference, parameters: Any) -> Any:
-        """Memory before the first step."""
-
-    def step(self, memory: Any, inputs: ControlInputs, parameters: Any, dt: Scalar) -> tuple[Any, ControlOutput]:
-        """One sampling instant; pure."""
-
-
-CONTROLLERS: Registry[Any] = Registry("controller")
+CONTROLLER = Slot(
+    "controller",
+    Controller,
+    "belief",
+    "control law: from estimate and reference to a wrench",
+    "controllers",
+    default="roismc",
+    presets=presets,
+    inputs=_inputs,
+)
 
 
 class TrackingError(NamedTuple):
@@ -98,28 +94,83 @@ class TrackingError(NamedTuple):
 
 
 class LawOutput(NamedTuple):
-    """Virtual accelerations of one group of axes, without feed-forward."""
+    """Virtual accelerations of one group of axes, without feed-forward, and what a law has to say of them."""
 
     u: Vec3  # m/s^2 or rad/s^2
-    sigma: Vec3
     gain_e: Mat3  # 1/s^2
     gain_rate: Mat3  # 1/s
-    riccati_residual: Scalar
-    riccati_guarded: Scalar
+    sigma: Vec3 = zeros()  # sliding variable; of laws that have one
     outside: Vec3 = zeros()  # 1 on axes outside the boundary layer
+    riccati_residual: Scalar = 0.0  # of laws that solve a Riccati equation
+    riccati_guarded: Scalar = 0.0  # 1 where the guaranteed gain was flown
 
 
-class Law(Protocol):
-    """Six double integrators' control law, position and attitude axes as two groups of three."""
+class SlidingSignals(NamedTuple):
+    """What sliding mode laws record."""
 
-    def parameters(self, vehicle: Vehicle, period: float) -> Any:
+    sigma_position: Annotated[Vec3, Q("m/s", "world: x forward, y left, z up", "sliding variable, times its weight")]
+    sigma_attitude: Annotated[
+        Vec3, Q("rad/s", "roll, pitch, yaw of body in world", "sliding variable, times its weight")
+    ]
+    outside_layer_position: Annotated[
+        Vec3, Q("1", "world: x forward, y left, z up", "1 on axes outside the boundary layer")
+    ]
+    outside_layer_attitude: Annotated[
+        Vec3, Q("1", "roll, pitch, yaw of body in world", "1 on axes outside the boundary layer")
+    ]
+    outside_layer: Annotated[Scalar, Q("1", NO_FRAME, "1 where any axis is outside its boundary layer", "fraction")]
+    lyapunov: Annotated[Scalar, Q("1", NO_FRAME, "V = sigma^T sigma / 2 over all six axes")]
+
+
+class RiccatiSignals(NamedTuple):
+    """What laws record that solve a Riccati equation in flight."""
+
+    riccati_residual: Annotated[
+        Scalar, Q("1", NO_FRAME, "relative residual of the attitude Riccati equation", "largest")
+    ]
+    riccati_guarded: Annotated[Scalar, Q("1", NO_FRAME, "1 where the guaranteed gain was flown", "fraction")]
+
+
+class LawMemory(NamedTuple):
+    """Memory of a law: that of the position axes and that of the attitude axes."""
+
+    position: Any
+    attitude: Any
+
+
+class Law(Generic[ParametersT]):
+    """Six double integrators' control law, position and attitude axes as two groups of three.
+
+    Attributes
+    ----------
+    Settings : type of Strict
+        What a user may choose.
+    records : tuple of types of NamedTuple
+        `SlidingSignals` and `RiccatiSignals`, for laws that have such quantities.
+    """
+
+    Settings: ClassVar[type[Strict]]
+    records: ClassVar[tuple[type[Record], ...]] = ()
+
+    def __init__(self, settings: Any) -> None:
+        self.settings = settings
+
+    def parameters(self, context: Context) -> ParametersT:
         """Numbers of the law as a record."""
+        raise NotImplementedError
 
-    def initial(self, position: TrackingError, attitude: TrackingError, parameters: Any) -> Any:
-        """Memory before the first step, a record with fields `position` and `attitude`."""
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: ParametersT) -> LawMemory:
+        """Memory before the first step."""
+        return LawMemory(Nothing(), Nothing())
 
-    def position(self, memory: Any, error: TrackingError, parameters: Any, dt: Scalar) -> tuple[Any, LawOutput]:
+    def position(
+        self, memory: Any, error: TrackingError, parameters: ParametersT, dt: Scalar
+    ) -> tuple[Any, LawOutput]:
         """Virtual accelerations of x, y, z."""
+        raise NotImplementedError
 
-    def attitude(self, memory: Any, error: TrackingError, parameters: Any, dt: Scalar) -> tuple[Any, LawOutput]:
+    def attitude(
+        self, memory: Any, error: TrackingError, parameters: ParametersT, dt: Scalar
+    ) -> tuple[Any, LawOutput]:
         """Virtual accelerations of roll, pitch, yaw."""
+        raise NotImplementedError

@@ -12,22 +12,23 @@ controller that shall run in every engine is a block in the scalar style instead
 from __future__ import annotations
 
 import traceback
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
-from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput, no_telemetry
+from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
 from rotorfault.base.errors import InputError
-from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Measurement, Reference, Wrench
+from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle
 
 
 class Updates(Protocol):
     """What a plain Python controller has."""
 
-    def update(self, time: float, measurement: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
-        """Demanded wrench in N and N m, body axes, at a time in s."""
+    def update(self, time: float, estimate: Estimate, reference: Reference, vehicle: Vehicle) -> Wrench | PerRotor:
+        """Demanded wrench in N and N m, body axes, or thrust commands of the rotors in N, at a time in s."""
 
 
 class Clock(NamedTuple):
@@ -42,36 +43,42 @@ class Sampling(NamedTuple):
     period: Scalar  # s
 
 
-class PythonController:
-    """Wraps an object with ``update`` as a controller of the python engine."""
+class PythonController(Controller[Clock, Sampling]):
+    """Wraps an object with ``update`` as a controller of the python engine.
 
-    python_only = True
+    Parameters
+    ----------
+    inner : object with ``update``
+    """
+
+    python_only: ClassVar[bool] = True
 
     def __init__(self, inner: Updates) -> None:
+        super().__init__()
         self.inner = inner
 
-    def parameters(self, vehicle: Vehicle, period: float) -> Sampling:
+    def parameters(self, context: Context) -> Sampling:
         """The sampling period."""
-        return Sampling(period)
+        return Sampling(context.period)
 
-    def initial(self, measurement: Measurement, reference: Reference, parameters: Sampling) -> Clock:
+    def initial(self, inputs: ControlInputs, parameters: Sampling) -> Clock:
         """No step counted."""
         return Clock(0.0)
 
     def step(
         self, memory: Clock, inputs: ControlInputs, parameters: Sampling, dt: Scalar
-    ) -> tuple[Clock, ControlOutput]:
+    ) -> tuple[Clock, ControlOutput, Record]:
         """Ask the object.
 
         Raises
         ------
         InputError
-            If it raises anything, or what it returns is no wrench of four numbers.
+            If it raises anything, or what it returns is neither a wrench nor commands of four numbers.
         """
         time = memory.steps * parameters.period
         name = type(self.inner).__name__
         try:
-            wrench = self.inner.update(time, inputs.measurement, inputs.reference, inputs.vehicle)
+            demand = self.inner.update(time, inputs.estimate, inputs.reference, inputs.vehicle)
         except Exception as error:
             # Told at once: the engine would take a division by zero in here for a flight that is lost.
             frame = traceback.extract_tb(error.__traceback__)[-1]
@@ -79,17 +86,23 @@ class PythonController:
                 f"controller {name}.update at t = {time:g} s: {type(error).__name__}: {' '.join(str(error).split())} "
                 f"({frame.filename}, line {frame.lineno})"
             ) from error
-        try:
-            thrust, roll, pitch, yaw = (float(x) for x in flatten(wrench))
-        except (TypeError, ValueError):
-            raise InputError(
-                f"controller {name}.update returned {wrench!r}; allowed: Wrench(thrust, Vec3(roll, pitch, yaw))"
-            ) from None
-        output = ControlOutput(Wrench(thrust, Vec3(roll, pitch, yaw)), zeros(), no_telemetry())
-        return Clock(memory.steps + 1.0), output
+        return Clock(memory.steps + 1.0), ControlOutput(_checked(demand, name)), Nothing()
 
 
-def as_controller(given: Any) -> Controller:
+def _checked(demand: object, name: str) -> Wrench | PerRotor:
+    try:
+        first, second, third, fourth = (float(x) for x in flatten(demand))
+    except (TypeError, ValueError):
+        raise InputError(
+            f"controller {name}.update returned {demand!r}; allowed: Wrench(thrust, Vec3(roll, pitch, yaw)), or "
+            "PerRotor(r1, r2, r3, r4) of thrust commands"
+        ) from None
+    if isinstance(demand, PerRotor):
+        return PerRotor(first, second, third, fourth)
+    return Wrench(first, Vec3(second, third, fourth))
+
+
+def as_controller(given: Any) -> Controller[Any, Any]:
     """A controller from what a user hands in: a block as it is, an object with ``update`` wrapped.
 
     Raises
@@ -99,11 +112,11 @@ def as_controller(given: Any) -> Controller:
     """
     if isinstance(given, type):
         raise InputError(f"controller {given.__name__} is a class; hand in an object: {given.__name__}()")
-    if all(callable(getattr(given, name, None)) for name in ("parameters", "initial", "step")):
-        return given  # type: ignore[no-any-return]
+    if isinstance(given, Controller):
+        return given
     if callable(getattr(given, "update", None)):
         return PythonController(given)
     raise InputError(
-        f"controller {type(given).__name__}: allowed are the name of a registered controller, a block with "
-        "parameters, initial and step, or an object with update"
+        f"controller {type(given).__name__}: allowed are the name of a registered controller, an object of a class that "
+        "derives from rotorfault.Controller, or an object with update"
     )

@@ -27,7 +27,14 @@ from rotorfault.autopilot.control.integral_sliding import (
     outside_layer,
     start,
 )
-from rotorfault.autopilot.control.protocol import LawOutput, TrackingError
+from rotorfault.autopilot.control.protocol import (
+    Law,
+    LawMemory,
+    LawOutput,
+    RiccatiSignals,
+    SlidingSignals,
+    TrackingError,
+)
 from rotorfault.autopilot.control.riccati import Gain
 from rotorfault.autopilot.control.sdre import (
     SdreParameters,
@@ -40,7 +47,7 @@ from rotorfault.autopilot.control.sdre import (
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Context
 
 
 class RoismcSettings(Strict):
@@ -74,29 +81,20 @@ class AttitudeMemory(NamedTuple):
     surface: Surface
 
 
-class RoismcMemory(NamedTuple):
-    """Memory of the law."""
-
-    position: Surface
-    attitude: AttitudeMemory
-
-
-class Roismc:
+class Roismc(Law[RoismcParameters]):
     """ROISMC of the paper: SDRE feedback plus integral sliding mode, no reaching phase."""
 
     Settings = RoismcSettings
+    records = (SlidingSignals, RiccatiSignals)
 
-    def __init__(self, settings: RoismcSettings) -> None:
-        self.settings = settings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> RoismcParameters:
+    def parameters(self, context: Context) -> RoismcParameters:
         """Numbers of the law."""
         s = self.settings
         return RoismcParameters(sdre_parameters(s.weights), s.position.gains(), s.attitude.gains())
 
-    def initial(self, position: TrackingError, attitude: TrackingError, parameters: RoismcParameters) -> RoismcMemory:
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: RoismcParameters) -> LawMemory:
         """sigma(0) = 0 on all axes, guaranteed Riccati gain."""
-        return RoismcMemory(
+        return LawMemory(
             position=start(position.rate),
             attitude=AttitudeMemory(initial_gain(attitude.drift, parameters.sdre), start(attitude.rate)),
         )
@@ -110,7 +108,7 @@ class Roismc:
         s = self.settings
         memory, u, sigma = add_switching(memory, error, nominal, parameters.position, s.nominal, s.switching, dt)
         return memory, LawOutput(
-            u, sigma, Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0, outside_layer(sigma, parameters.position)
+            u, Mat3.diagonal(k1), Mat3.diagonal(k2), sigma, outside_layer(sigma, parameters.position)
         )
 
     def attitude(
@@ -126,5 +124,5 @@ class Roismc:
             memory.surface, error, nominal, parameters.attitude, s.nominal, s.switching, dt
         )
         return AttitudeMemory(gain, surface), LawOutput(
-            u, sigma, K_angle, K_rate, residual, guarded, outside_layer(sigma, parameters.attitude)
+            u, K_angle, K_rate, sigma, outside_layer(sigma, parameters.attitude), residual, guarded
         )

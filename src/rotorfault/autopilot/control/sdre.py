@@ -16,11 +16,12 @@ from typing import NamedTuple
 
 from pydantic import Field, field_validator
 
-from rotorfault.autopilot.control.protocol import LawOutput, TrackingError
+from rotorfault.autopilot.control.protocol import Law, LawMemory, LawOutput, RiccatiSignals, TrackingError
 from rotorfault.autopilot.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain
 from rotorfault.base.config import Strict, Three
-from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, sqrt
+from rotorfault.model.block import Context, Nothing
 from rotorfault.model.vehicle import Vehicle
 
 
@@ -146,36 +147,27 @@ def initial_gain(drift: Mat3, parameters: SdreParameters) -> Gain:
     )
 
 
-class SdreMemory(NamedTuple):
-    """Memory of the SDRE law."""
-
-    position: tuple[()]
-    attitude: Gain
-
-
-class Sdre:
+class Sdre(Law[SdreParameters]):
     """SDRE state feedback alone, equation (21): optimal weights, no sliding mode."""
 
     Settings = Weights
+    records = (RiccatiSignals,)
 
-    def __init__(self, settings: Weights) -> None:
-        self.settings = settings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> SdreParameters:
+    def parameters(self, context: Context) -> SdreParameters:
         """Numbers of the law."""
         return sdre_parameters(self.settings)
 
-    def initial(self, position: TrackingError, attitude: TrackingError, parameters: SdreParameters) -> SdreMemory:
+    def initial(self, position: TrackingError, attitude: TrackingError, parameters: SdreParameters) -> LawMemory:
         """Start from the guaranteed gain."""
-        return SdreMemory(position=(), attitude=initial_gain(attitude.drift, parameters))
+        return LawMemory(position=Nothing(), attitude=initial_gain(attitude.drift, parameters))
 
     def position(
-        self, memory: tuple[()], error: TrackingError, parameters: SdreParameters, dt: Scalar
-    ) -> tuple[tuple[()], LawOutput]:
+        self, memory: Nothing, error: TrackingError, parameters: SdreParameters, dt: Scalar
+    ) -> tuple[Nothing, LawOutput]:
         """u = -k1 e - k2 e_dot on x, y, z."""
         k1, k2 = position_gains(error.e, parameters)
         u = -k1.times(error.e) - k2.times(error.e_dot)
-        return memory, LawOutput(u, zeros(), Mat3.diagonal(k1), Mat3.diagonal(k2), 0.0, 0.0)
+        return memory, LawOutput(u, Mat3.diagonal(k1), Mat3.diagonal(k2))
 
     def attitude(
         self, memory: Gain, error: TrackingError, parameters: SdreParameters, dt: Scalar
@@ -185,4 +177,4 @@ class Sdre:
             memory, error.drift, parameters, self.settings.newton_steps
         )
         u = -(K_angle @ error.e) - K_rate @ error.e_dot
-        return gain, LawOutput(u, zeros(), K_angle, K_rate, residual, guarded)
+        return gain, LawOutput(u, K_angle, K_rate, riccati_residual=residual, riccati_guarded=guarded)

@@ -20,14 +20,14 @@ from typing import NamedTuple
 from pydantic import Field, field_validator
 
 from rotorfault.autopilot.control.integral_sliding import Switching
-from rotorfault.autopilot.control.protocol import LawOutput, TrackingError
+from rotorfault.autopilot.control.protocol import Law, LawOutput, SlidingSignals, TrackingError
 from rotorfault.autopilot.control.riccati import position_gain
 from rotorfault.autopilot.control.sdre import Weights, position_gains, sdre_parameters
 from rotorfault.base.config import Strict, Three
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, greater, saturate, sign
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Context, Nothing
 
 MATCH_AT = 0.1  # m: position error at which bandwidths are compared
 
@@ -79,13 +79,6 @@ class SmcParameters(NamedTuple):
 
     position: SlidingParameters
     attitude: SlidingParameters
-
-
-class SmcMemory(NamedTuple):
-    """SMC has no memory."""
-
-    position: tuple[()]
-    attitude: tuple[()]
 
 
 def matched(own: SlidingSettings, k1: Three, k2: Three) -> SlidingSettings:
@@ -142,15 +135,16 @@ def matched_settings(settings: SmcSettings) -> SmcSettings:
     )
 
 
-class Smc:
+class Smc(Law[SmcParameters]):
     """Conventional sliding mode control on s = e_dot + lambda e, the paper's opponent."""
 
     Settings = SmcSettings
+    records = (SlidingSignals,)
 
     def __init__(self, settings: SmcSettings) -> None:
         self.settings = matched_settings(settings)
 
-    def parameters(self, vehicle: Vehicle, period: float) -> SmcParameters:
+    def parameters(self, context: Context) -> SmcParameters:
         """Numbers of the law."""
         return SmcParameters(
             *(
@@ -159,19 +153,15 @@ class Smc:
             )
         )
 
-    def initial(self, position: TrackingError, attitude: TrackingError, parameters: SmcParameters) -> SmcMemory:
-        """Nothing to remember."""
-        return SmcMemory((), ())
-
     def position(
-        self, memory: tuple[()], error: TrackingError, parameters: SmcParameters, dt: Scalar
-    ) -> tuple[tuple[()], LawOutput]:
+        self, memory: Nothing, error: TrackingError, parameters: SmcParameters, dt: Scalar
+    ) -> tuple[Nothing, LawOutput]:
         """Virtual accelerations of x, y, z."""
         return memory, self._slide(error, parameters.position)
 
     def attitude(
-        self, memory: tuple[()], error: TrackingError, parameters: SmcParameters, dt: Scalar
-    ) -> tuple[tuple[()], LawOutput]:
+        self, memory: Nothing, error: TrackingError, parameters: SmcParameters, dt: Scalar
+    ) -> tuple[Nothing, LawOutput]:
         """Virtual accelerations of roll, pitch, yaw."""
         output = self._slide(error, parameters.attitude)
         # The gyroscopic products are known: cancelled, as f_ff in the law.
@@ -185,4 +175,4 @@ class Smc:
         # Gains of the linear range, for the record and the linearisation.
         steep = reaching + K / layer if self.settings.switching == "smooth" else reaching
         outside = s.map(lambda s_i: greater(absolute(s_i), layer))
-        return LawOutput(u, s, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), 0.0, 0.0, outside)
+        return LawOutput(u, Mat3.diagonal(steep.times(slope)), Mat3.diagonal(slope + steep), s, outside)

@@ -1,10 +1,11 @@
 """Diagnosis: what the autopilot believes about its rotors.
 
-Importing the package registers every source of diagnosis, so that `DIAGNOSES` is complete.
+Importing the package registers every source of diagnosis, so that the registry is complete.
 """
 
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger
-from rotorfault.autopilot.diagnosis.oracle import Delayed, Off, Oracle
-from rotorfault.autopilot.diagnosis.protocol import DIAGNOSES
+from rotorfault.autopilot.diagnosis.off import Off
+from rotorfault.autopilot.diagnosis.oracle import Delayed, Present
+from rotorfault.autopilot.diagnosis.protocol import DIAGNOSIS, Diagnoser, DiagnosisInputs, Oracle
 
-__all__ = ["DIAGNOSES", "Delayed", "Luenberger", "Off", "Oracle"]
+__all__ = ["DIAGNOSIS", "Delayed", "Diagnoser", "DiagnosisInputs", "Luenberger", "Off", "Oracle", "Present"]

@@ -38,14 +38,17 @@ from rotorfault.autopilot.diagnosis.decision import (
     decision_parameters,
     undecided,
 )
-from rotorfault.autopilot.diagnosis.protocol import DIAGNOSES, DiagnosisInputs
+from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, maximum
+from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import nominal_inverse
-from rotorfault.model.signals import Diagnosis, Measurement, Wrench
-from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, wrench_of
+from rotorfault.model.motion import drag_acceleration, torque_of_motion
+from rotorfault.model.signals import Diagnosis, Wrench
+from rotorfault.model.slot import register
+from rotorfault.model.vehicle import wrench_of
 
 Form = Literal["injected", "linear", "lag_states"]
 LEAST_COSINE = 0.2  # below it the vertical balance hardly sees the thrust; the observer must not divide by it
@@ -120,18 +123,14 @@ def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[flo
     return 1.0 - p * q / decay, (decay - p) * (decay - q) / (carry * decay)
 
 
-@DIAGNOSES.register("luenberger")
 @final
-class Luenberger:
+@register("luenberger")
+class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
     """Luenberger observer of thrust deviations with threshold and persistence."""
 
     Settings = LuenbergerSettings
-    oracle_delay = None
 
-    def __init__(self, settings: LuenbergerSettings) -> None:
-        self.settings = settings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> LuenbergerParameters:
+    def parameters(self, context: Context) -> LuenbergerParameters:
         """Discrete model and gain.
 
         Raises
@@ -139,6 +138,7 @@ class Luenberger:
         InputError
             If a pole is too fast for the sampling period, so that its discrete image cannot be told from 0.
         """
+        vehicle, period = context
         fastest = max(self.settings.poles)
         if fastest * period > 30.0:
             raise InputError(
@@ -154,27 +154,29 @@ class Luenberger:
             carry, decay, gain_rate, gain_deviation, decision_parameters(self.settings.decision)
         )
 
-    def initial(self, measurement: Measurement, parameters: LuenbergerParameters) -> LuenbergerMemory:
-        """Start at the measured rates without deviation."""
-        return LuenbergerMemory(measurement.v_W.z, measurement.omega_B, 0.0, zeros(), 0.0, undecided())
+    def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
+        """Start at the estimated rates without deviation."""
+        return LuenbergerMemory(inputs.estimate.v_W.z, inputs.estimate.omega_B, 0.0, zeros(), 0.0, undecided())
 
     def step(
-        self, memory: LuenbergerMemory, inputs: DiagnosisInputs, parameters: LuenbergerParameters
-    ) -> tuple[LuenbergerMemory, Diagnosis]:
+        self, memory: LuenbergerMemory, inputs: DiagnosisInputs, parameters: LuenbergerParameters, dt: Scalar
+    ) -> tuple[LuenbergerMemory, Diagnosis, Record]:
         """One sampling instant."""
-        vehicle, dt, now = inputs.vehicle, inputs.elapsed, inputs.measurement
+        vehicle, elapsed, now = inputs.vehicle, inputs.expectation.elapsed, inputs.estimate
         cosine, climb_change, omega_change = self._model(inputs)
         # At the first step nothing has elapsed: the deviations (zero) must not be carried either.
         carry = parameters.carry * memory.started
-        climb = memory.climb + climb_change * dt + cosine * memory.delta_z * carry
-        omega_B = memory.omega_B + omega_change * dt + memory.delta_omega * carry
+        climb = memory.climb + climb_change * elapsed + cosine * memory.delta_z * carry
+        omega_B = memory.omega_B + omega_change * elapsed + memory.delta_omega * carry
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
         delta_z = delta_z + parameters.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * parameters.gain_deviation
         residual = nominal_inverse(vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega)))
-        decision, diagnosis = decide(memory.decision, residual, inputs.thrust, vehicle, parameters.decision, dt)
+        decision, diagnosis = decide(
+            memory.decision, residual, inputs.expectation.thrust, vehicle, parameters.decision, elapsed
+        )
         after = LuenbergerMemory(
             climb=climb + parameters.gain_rate * innovation_z,
             omega_B=omega_B + innovation * parameters.gain_rate,
@@ -183,24 +185,23 @@ class Luenberger:
             started=1.0,
             decision=decision,
         )
-        return after, diagnosis
+        return after, diagnosis, Nothing()
 
     def _model(self, inputs: DiagnosisInputs) -> tuple[Scalar, Scalar, Vec3]:
         """(cosine of the tilt, vertical acceleration, angular acceleration) of a sound vehicle, period's mean."""
-        vehicle = inputs.vehicle
-        wrench = wrench_of(vehicle, inputs.mean_thrust)
+        vehicle, expectation = inputs.vehicle, inputs.expectation
+        wrench = wrench_of(vehicle, expectation.mean_thrust)
         lift = wrench.thrust / vehicle.mass
         turn = wrench.torque_B.over(vehicle.inertia)
         if self.settings.form != "injected":
             return 1.0, lift - vehicle.gravity, turn
-        before, now = inputs.previous, inputs.now
+        before, now = expectation.previous, expectation.now
         cosine = 0.5 * (before.axis_W.z + now.axis_W.z)
         climb = 0.5 * (before.v_W.z + now.v_W.z)
         omega_B = (before.omega_B + now.omega_B) * 0.5
-        J = vehicle.inertia
-        gyroscopic = gyroscopic_torque(vehicle, omega_B, inputs.residual_speed) - omega_B.cross(J.times(omega_B))
+        turning = torque_of_motion(vehicle, omega_B, expectation.residual_speed)
         return (
             cosine,
-            cosine * lift - vehicle.gravity - vehicle.linear_drag / vehicle.mass * climb,
-            turn + gyroscopic.over(J),
+            cosine * lift - vehicle.gravity + drag_acceleration(vehicle, Vec3(0.0, 0.0, -climb)).z,
+            turn + turning.over(vehicle.inertia),
         )

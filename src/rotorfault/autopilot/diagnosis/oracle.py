@@ -1,7 +1,7 @@
-"""Sources of diagnosis for studies: the truth, the truth some time ago, and none.
+"""Sources of diagnosis for studies: the truth, at once or some time ago.
 
-They bound what any diagnosis can be worth. The closed loop hands them the true losses; nothing else in the
-autopilot can see those.
+They bound what any diagnosis can be worth. The closed loop tells them the true losses; nothing else in the autopilot
+can see those.
 """
 
 from __future__ import annotations
@@ -10,100 +10,91 @@ from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis.protocol import DIAGNOSES, DiagnosisInputs
+from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs, Oracle
 from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, greater
-from rotorfault.model.signals import Diagnosis, Measurement, healthy
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Context, Nothing
+from rotorfault.model.signals import Diagnosis
+from rotorfault.model.slot import register
 
 
-class OracleSettings(Strict):
+class PresentSettings(Strict):
     """The truth at once."""
 
     threshold: float = Field(default=0.001, ge=0.0, lt=1.0, description="loss above which a rotor is flagged")
 
 
-class DelayedSettings(OracleSettings):
+class DelayedSettings(PresentSettings):
     """The truth some time ago."""
 
     delay: float = Field(default=0.1, ge=0.0, description="age of the truth [s]")
 
 
-class OracleParameters(NamedTuple):
+class PresentParameters(NamedTuple):
     """Numbers of the oracle."""
 
     threshold: Scalar
 
 
-class _Truth:
-    """Shared by `Oracle` and `Delayed`: true losses above a threshold are believed."""
+class DelayedParameters(NamedTuple):
+    """Numbers of the late oracle."""
 
-    settings: OracleSettings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> OracleParameters:
-        """Numbers of the settings."""
-        return OracleParameters(self.settings.threshold)
-
-    def initial(self, measurement: Measurement, parameters: OracleParameters) -> tuple[()]:
-        """Nothing to remember."""
-        return ()
-
-    def step(
-        self, memory: tuple[()], inputs: DiagnosisInputs, parameters: OracleParameters
-    ) -> tuple[tuple[()], Diagnosis]:
-        """Believe what the closed loop says."""
-        loss = inputs.true_loss
-        flagged = loss.map(lambda x: greater(x, parameters.threshold))
-        return memory, Diagnosis(
-            loss=loss * flagged, flagged=flagged, estimate=loss, residual=-(loss * inputs.thrust)
-        )
+    threshold: Scalar
+    delay: Scalar  # s
 
 
-@DIAGNOSES.register("oracle")
+def believed(true_loss: PerRotor, thrust: PerRotor, threshold: Scalar) -> Diagnosis:
+    """True losses above a threshold, taken as they are.
+
+    Parameters
+    ----------
+    true_loss : PerRotor
+        0 to 1.
+    thrust : PerRotor, N
+        Of sound rotors now.
+    threshold : scalar
+        Loss above which a rotor is flagged.
+    """
+    flagged = true_loss.map(lambda x: greater(x, threshold))
+    return Diagnosis(loss=true_loss * flagged, flagged=flagged, estimate=true_loss, residual=-(true_loss * thrust))
+
+
 @final
-class Oracle(_Truth):
+@register("oracle")
+class Present(Oracle[Nothing, PresentParameters]):
     """The true losses at once: the best that any diagnosis could do."""
 
-    Settings = OracleSettings
-    oracle_delay = 0.0
+    Settings = PresentSettings
 
-    def __init__(self, settings: OracleSettings) -> None:
-        self.settings = settings
+    def parameters(self, context: Context) -> PresentParameters:
+        """The threshold."""
+        return PresentParameters(self.settings.threshold)
+
+    def age(self, parameters: PresentParameters) -> Scalar:
+        """None."""
+        return 0.0
+
+    def told(self, true_loss: PerRotor, inputs: DiagnosisInputs, parameters: PresentParameters) -> Diagnosis:
+        """The truth."""
+        return believed(true_loss, inputs.expectation.thrust, parameters.threshold)
 
 
-@DIAGNOSES.register("delayed")
 @final
-class Delayed(_Truth):
+@register("delayed")
+class Delayed(Oracle[Nothing, DelayedParameters]):
     """The true losses some time ago: what a diagnosis of that delay would be worth."""
 
     Settings = DelayedSettings
 
-    def __init__(self, settings: DelayedSettings) -> None:
-        self.settings = settings
-        self.oracle_delay = settings.delay
+    def parameters(self, context: Context) -> DelayedParameters:
+        """Threshold and age of the truth."""
+        return DelayedParameters(self.settings.threshold, self.settings.delay)
 
+    def age(self, parameters: DelayedParameters) -> Scalar:
+        """As set."""
+        return parameters.delay
 
-@DIAGNOSES.register("off")
-@final
-class Off:
-    """No diagnosis: every rotor is believed sound."""
-
-    class Settings(Strict):
-        """Nothing to set."""
-
-    oracle_delay = None
-
-    def __init__(self, settings: Strict) -> None:
-        self.settings = settings
-
-    def parameters(self, vehicle: Vehicle, period: float) -> tuple[()]:
-        """None."""
-        return ()
-
-    def initial(self, measurement: Measurement, parameters: tuple[()]) -> tuple[()]:
-        """Nothing to remember."""
-        return ()
-
-    def step(self, memory: tuple[()], inputs: DiagnosisInputs, parameters: tuple[()]) -> tuple[tuple[()], Diagnosis]:
-        """Blame nobody."""
-        return memory, healthy()
+    def told(self, true_loss: PerRotor, inputs: DiagnosisInputs, parameters: DelayedParameters) -> Diagnosis:
+        """What was true then."""
+        return believed(true_loss, inputs.expectation.thrust, parameters.threshold)

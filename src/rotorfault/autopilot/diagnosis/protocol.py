@@ -1,50 +1,66 @@
-"""What a source of diagnosis is, and the registry of those that exist."""
+"""What a source of diagnosis is, and the slot of those that exist.
+
+A source sees what the autopilot estimates. Only one that derives from `Oracle` is told the true losses, by the
+closed loop; it serves studies of what a diagnosis can be worth.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
-from rotorfault.base.registry import Registry
+from rotorfault.autopilot.instant import Instant
+from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.signals import Diagnosis, Measurement, Motion
+from rotorfault.model.block import Block, MemoryT, ParametersT
+from rotorfault.model.signals import Diagnosis, Estimate
+from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 
 
 class DiagnosisInputs(NamedTuple):
     """All that a source of diagnosis may use at one sampling instant."""
 
-    measurement: Measurement
-    now: Motion  # as measured
-    previous: Motion  # one period earlier; the same as `now` at the first step
+    estimate: Estimate
+    expectation: Expectation  # what sound rotors would have done over the last period
+    command: PerRotor  # N, sent at the last instant
     vehicle: Vehicle  # belief
-    mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the last period
-    thrust: PerRotor  # N: thrust of sound rotors now
-    residual_speed: Scalar  # rad/s: believed Omega of (4)
-    elapsed: Scalar  # s: time since the last step, 0 at the first
-    true_loss: PerRotor  # for `oracle` and `delayed` only; other sources must not read it
 
 
-class Diagnoser(Protocol):
-    """A block that turns measurements into a belief about the rotors.
-
-    A class that satisfies it holds its configuration class as `Settings`, and says in the first line of its
-    docstring what it does. `oracle_delay` is None for a source that sees measurements only; else the closed loop
-    hands it the true losses of so many seconds ago.
-    """
-
-    oracle_delay: float | None
-
-    def __init__(self, settings: Any) -> None: ...
-
-    def parameters(self, vehicle: Vehicle, period: float) -> Any:
-        """Numbers as a record, for a believed vehicle and a sampling period in s."""
-
-    def initial(self, measurement: Measurement, parameters: Any) -> Any:
-        """Memory before the first step."""
-
-    def step(self, memory: Any, inputs: DiagnosisInputs, parameters: Any) -> tuple[Any, Diagnosis]:
-        """One sampling instant; pure."""
+class Diagnoser(Block[DiagnosisInputs, Diagnosis, MemoryT, ParametersT]):
+    """Turns estimates into a belief about the rotors."""
 
 
-DIAGNOSES: Registry[Any] = Registry("diagnosis")
+class Oracle(Diagnoser[MemoryT, ParametersT]):
+    """A source that is told the truth: the closed loop calls `told` in place of `step`."""
+
+    def age(self, parameters: ParametersT) -> Scalar:
+        """How old the truth is that it wants, in s."""
+        raise NotImplementedError(f"{type(self).__name__} does not say how old a truth it wants")
+
+    def told(self, true_loss: PerRotor, inputs: DiagnosisInputs, parameters: ParametersT) -> Diagnosis:
+        """The belief that true losses make.
+
+        Parameters
+        ----------
+        true_loss : PerRotor
+            Of `age` seconds ago.
+        inputs : DiagnosisInputs
+        parameters : record
+        """
+        raise NotImplementedError(f"{type(self).__name__} makes nothing of the truth")
+
+
+def _inputs(instant: Instant) -> DiagnosisInputs:
+    return DiagnosisInputs(instant.estimate, instant.expectation, instant.past.command.thrust, instant.vehicle)
+
+
+DIAGNOSIS = Slot(
+    "diagnosis",
+    Diagnoser,
+    "belief",
+    "source of diagnosis: which rotors are believed to have lost how much",
+    "diagnoses",
+    default="luenberger",
+    inputs=_inputs,
+)

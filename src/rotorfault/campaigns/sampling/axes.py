@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 
 Columns = dict[str, NDArray[Any]]
 

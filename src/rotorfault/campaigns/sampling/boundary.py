@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import isotonic_regression
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 from rotorfault.campaigns.sampling.statistics import Array, Interval, check_level, clopper_pearson
 
 MONOTONE = ("rising", "falling")

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import bdtr, betaln, gammaln, ndtri, stdtrit, xlogy
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 from rotorfault.campaigns.sampling.statistics import Array, check_level
 
 HALVINGS = 60  # of an interval of length 2: to rounding

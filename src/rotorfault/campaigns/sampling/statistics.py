@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaincinv, ndtri
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 
 Array = NDArray[np.float64]
 

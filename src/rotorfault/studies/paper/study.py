@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import output_folder, write_atomically
-from rotorfault.base.registry import unknown
+from rotorfault.base.errors import unknown
 from rotorfault.report import figures as drawing
 from rotorfault.studies.paper import ablation, claims, figures, sensitivity, table1
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, matched_runs

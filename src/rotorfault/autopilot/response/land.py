@@ -1,4 +1,4 @@
-r"""What the autopilot does about a confirmed fault: fly on, or land. It stands between reference and controller.
+r"""Landing as the response to a confirmed fault.
 
 ``land`` replaces the scenario's reference, from the sampling instant at which a declared fault has stood for
 ``confirmation``, by one that starts at the measured position p, velocity v and yaw, so that nothing jumps, and obeys
@@ -27,12 +27,14 @@ Nothing here sees the plant: a false alarm lands the vehicle too, and a fault th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, final
+from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
 
+from rotorfault.autopilot.instant import Decision
+from rotorfault.autopilot.prediction import predict
+from rotorfault.autopilot.response.protocol import Response, ResponseInputs
 from rotorfault.base.config import Strict
-from rotorfault.base.registry import Registry
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import (
@@ -48,91 +50,12 @@ from rotorfault.maths.scalar import (
     select,
     sqrt,
 )
-from rotorfault.model.signals import Diagnosis, Measurement, Reference
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.block import Context, Record
+from rotorfault.model.signals import Diagnosis, Reference
+from rotorfault.model.slot import register
+from rotorfault.model.telemetry import NO_FRAME, Q
 
-
-class ResponseInputs(NamedTuple):
-    """All that a response to a fault may use at one sampling instant."""
-
-    measurement: Measurement
-    reference: Reference  # the scenario's
-    vehicle: Vehicle  # belief
-    diagnosis: Diagnosis
-    thrust: Scalar  # N: of all rotors now, as believed
-    unexplained_v_z: Scalar  # m/s: change of vertical velocity over the last period that the believed model misses
-
-
-class Decided(NamedTuple):
-    """What is flown in place of the scenario's reference."""
-
-    reference: Reference
-    stage: Scalar  # 0 as the scenario wants, 1 descending, 2 rotors stopped
-    relief: Scalar  # share of every thrust that is taken back, 1 with rotors stopped
-
-
-class Response(Protocol):
-    """A block between reference and controller. A final class with its configuration class as `Settings`."""
-
-    def __init__(self, settings: Any) -> None: ...
-
-    def parameters(self) -> Any:
-        """Numbers as a record."""
-
-    def initial(self, measurement: Measurement) -> Any:
-        """Memory before the first step."""
-
-    def believed(self, memory: Any, diagnosis: Diagnosis) -> Diagnosis:
-        """What to believe of a diagnosis; asked before `step`."""
-
-    def step(self, memory: Any, inputs: ResponseInputs, parameters: Any, dt: Scalar) -> tuple[Any, Decided]:
-        """One sampling instant; pure."""
-
-    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
-        """What is sent to the rotors of commanded thrusts in N."""
-
-
-HOLD = 0.1  # relief above which the belief about the rotors is held
-
-RESPONSES: Registry[Any] = Registry("response to a fault")
-
-
-class Nothing(NamedTuple):
-    """The record without numbers."""
-
-
-@RESPONSES.register("continue")
-@final
-class Continue:
-    """Fly on as the scenario says, whatever is diagnosed."""
-
-    class Settings(Strict):
-        """Nothing to choose."""
-
-    def __init__(self, settings: Settings | None = None) -> None:
-        self.settings = settings
-
-    def parameters(self) -> Nothing:
-        """No numbers."""
-        return Nothing()
-
-    def initial(self, measurement: Measurement) -> Nothing:
-        """No memory."""
-        return Nothing()
-
-    def believed(self, memory: Nothing, diagnosis: Diagnosis) -> Diagnosis:
-        """All of it."""
-        return diagnosis
-
-    def step(
-        self, memory: Nothing, inputs: ResponseInputs, parameters: Nothing, dt: Scalar
-    ) -> tuple[Nothing, Decided]:
-        """The scenario's reference as it is."""
-        return memory, Decided(inputs.reference, 0.0, 0.0)
-
-    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
-        """As commanded."""
-        return thrust
+HOLD = 0.1  # relief above which the belief about the rotors is held: suspicion has then lasted a tenth of `relief`
 
 
 class LandParameters(NamedTuple):
@@ -166,9 +89,16 @@ class LandMemory(NamedTuple):
     yaw: Scalar  # rad
 
 
-@RESPONSES.register("land")
+class LandTelemetry(NamedTuple):
+    """What a landing records of itself."""
+
+    lift: Annotated[Scalar, Q("m/s^2", NO_FRAME, "upward acceleration that the believed model misses, low-passed")]
+    relief: Annotated[Scalar, Q("1", NO_FRAME, "share of every thrust that is taken back")]
+
+
 @final
-class Land:
+@register("land")
+class Land(Response[LandMemory, LandParameters]):
     """Brake, descend level to the ground at a gentle rate, recognise touch-down, stop the rotors."""
 
     class Settings(Strict):
@@ -195,19 +125,18 @@ class Land:
         )
         persistence: float = Field(default=0.3, gt=0.0, description="time that both must hold [s]")
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
+    Telemetry = LandTelemetry
 
-    def parameters(self) -> LandParameters:
+    def parameters(self, context: Context) -> LandParameters:
         """The settings as a record."""
         return LandParameters(*(getattr(self.settings, name) for name in LandParameters._fields))
 
-    def initial(self, measurement: Measurement) -> LandMemory:
+    def initial(self, inputs: ResponseInputs, parameters: LandParameters) -> LandMemory:
         """No fault seen yet."""
         none = PerRotor.all(0.0)
-        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, 0.0, 0.0, measurement.p_W, zeros(), 0.0)
+        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, 0.0, 0.0, inputs.estimate.p_W, zeros(), 0.0)
 
-    def believed(self, memory: LandMemory, diagnosis: Diagnosis) -> Diagnosis:
+    def _believed(self, memory: LandMemory, diagnosis: Diagnosis) -> Diagnosis:
         """The last belief on the ground, or on what may be the ground; else the new one."""
         hold = greater(memory.relief, HOLD)
         loss, flagged = select_record(hold, (memory.loss, memory.fault), (diagnosis.loss, diagnosis.flagged))
@@ -215,28 +144,32 @@ class Land:
 
     def step(
         self, memory: LandMemory, inputs: ResponseInputs, parameters: LandParameters, dt: Scalar
-    ) -> tuple[LandMemory, Decided]:
-        """One sampling instant: the reference now, and that of the next instant in memory."""
-        p, seen = parameters, inputs.measurement
+    ) -> tuple[LandMemory, Decision, Record]:
+        """One sampling instant."""
+        diagnosis = self._believed(memory, inputs.diagnosis)
+        prediction = predict(inputs.expectation, diagnosis.loss, inputs.vehicle)
+        unexplained = inputs.estimate.v_W.z - inputs.expectation.previous.v_W.z - prediction.delta_v_W.z
+        thrust_now = inputs.expectation.thrust.dot(1.0 - diagnosis.loss)
+        p, seen = parameters, inputs.estimate
         # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
         half = 0.5 * dt
-        none = inputs.diagnosis.flagged.map(negated).reduce(both)
+        none = diagnosis.flagged.map(negated).reduce(both)
         flagged = select(none, 0.0, memory.flagged + dt)
         begun = both(negated(memory.landing), both(negated(none), greater_equal(flagged, p.confirmation - half)))
         landing = either(memory.landing, begun)
 
         p_W, v_W = select_record(begun, (seen.p_W, seen.v_W), (memory.p_W, memory.v_W))
-        yaw = select(begun, seen.attitude.z, memory.yaw)
+        yaw = select(begun, seen.q_WB.heading(), memory.yaw)
 
         # Contact: suspected, and answered.
         sinking = both(landing, less(v_W.z, -0.5 * p.descent_rate))
-        lift = memory.lift + (inputs.unexplained_v_z - memory.lift * dt) / (p.contact_filter + dt)
+        lift = memory.lift + (unexplained - memory.lift * dt) / (p.contact_filter + dt)
         contact = both(sinking, greater(lift, p.contact_share * inputs.vehicle.gravity))
         relief = memory.relief + (contact - memory.relief) * (dt / (p.relief + dt))
 
         # Touch-down.
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
-        standing = both(less(absolute(seen.v_W.z), p.still_speed), less(inputs.thrust, p.thrust_share * weight))
+        standing = both(less(absolute(seen.v_W.z), p.still_speed), less(thrust_now, p.thrust_share * weight))
         still = select(both(sinking, standing), memory.still + dt, 0.0)
         touched = both(negated(memory.down), greater_equal(still, p.persistence - half))
         down = either(memory.down, touched)
@@ -257,12 +190,8 @@ class Land:
             landing, (p_W + v_W * dt + a_W * (0.5 * dt * dt), v_W + a_W * dt), (memory.p_W, memory.v_W)
         )
         relief = select(down, 1.0, relief)
-        told = inputs.diagnosis
         after = LandMemory(
-            flagged, landing, lift, relief, told.loss, told.flagged, still, down, p_next_W, v_next_W, yaw
+            flagged, landing, lift, relief, diagnosis.loss, diagnosis.flagged, still, down, p_next_W, v_next_W, yaw
         )
-        return after, Decided(select_record(landing, wanted, inputs.reference), landing + down, relief)
-
-    def relieved(self, thrust: PerRotor, decided: Decided, vehicle: Vehicle) -> PerRotor:
-        """Less on contact, the least once the vehicle is down."""
-        return thrust.map(lambda f: vehicle.thrust_min + (f - vehicle.thrust_min) * (1.0 - decided.relief))
+        reference = select_record(landing, wanted, inputs.reference)
+        return after, Decision(reference, diagnosis, landing + down, relief), LandTelemetry(lift, relief)

@@ -1,10 +1,7 @@
 """The autopilot's model of its own rotors: what thrust a sound rotor gives for the commands that were sent.
 
-First-order lag (7), (8) under zero-order hold, exact: after a command c held for a period T,
-
-    v(T) = c + (v(0) - c) exp(-w0 T),        mean over the period = c + (v(0) - c) (1 - exp(-w0 T)) / (w0 T).
-
-Losses are not in it: it says what healthy rotors would do, so that deviations from it are faults (or wind).
+First-order lag (7), (8) under zero-order hold, exact (`rotorfault.model.motion.lag_held`). Losses are not in it: it
+says what healthy rotors would do, so that deviations from it are faults (or wind).
 """
 
 from __future__ import annotations
@@ -12,7 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, clip, exp
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.motion import lag_held, limited
 from rotorfault.model.vehicle import Vehicle, hover_thrust
 
 
@@ -37,8 +35,5 @@ def expected_thrust(model: RotorModel, vehicle: Vehicle) -> PerRotor:
 
 def follow(model: RotorModel, command: PerRotor, vehicle: Vehicle, dt: Scalar) -> RotorModel:
     """Hold commands [N] for a period; they are limited as the rotors limit them."""
-    held = command.map(lambda c: clip(c, vehicle.thrust_min, vehicle.thrust_max))
-    decay = exp(-vehicle.rotor_bandwidth * dt)
-    gap = model.lagged - held
-    mean = held + gap * ((1.0 - decay) / (vehicle.rotor_bandwidth * dt))
-    return RotorModel(lagged=held + gap * decay, mean=mean * vehicle.rotor_gain)
+    end, mean = lag_held(model.lagged, limited(vehicle, command), vehicle.rotor_bandwidth, dt)
+    return RotorModel(lagged=end, mean=mean * vehicle.rotor_gain)

@@ -1,0 +1,116 @@
+"""One sampling instant as the autopilot sees it: what is known so far, slot after slot.
+
+Each part of the autopilot gets its inputs from here, by the function `inputs` of its slot, and leaves its output
+here for the parts after it. Nothing here comes from the plant but readings.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple, cast, final
+
+from rotorfault.autopilot.prediction import Expectation, Prediction, predict
+from rotorfault.autopilot.rotor_model import RotorModel, expected_thrust
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.signals import (
+    Allocation,
+    Command,
+    Diagnosis,
+    Estimate,
+    Motion,
+    Readings,
+    Reference,
+    Wrench,
+    motion_of,
+)
+from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
+
+
+class Past(NamedTuple):
+    """What the autopilot carries from one sampling instant to the next besides the memories of its parts."""
+
+    rotors: RotorModel
+    previous: Motion | tuple[()]  # estimated last; empty before the first instant
+    command: Command  # sent last; hover before the first
+    elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
+
+
+class Decision(NamedTuple):
+    """What is flown in place of the scenario's reference, and what is believed; of the slot ``on_fault``."""
+
+    reference: Reference
+    diagnosis: Diagnosis  # what is believed of the rotors
+    stage: Scalar | tuple[()] = ()  # 0 as the scenario wants, 1 descending, 2 rotors stopped; empty if it never lands
+    relief: Scalar | tuple[()] = ()  # share of every thrust that is taken back, 1 with rotors stopped; empty if none
+
+
+@final
+class Instant:
+    """What is known at one sampling instant.
+
+    Parameters
+    ----------
+    readings : Readings
+    reference : Reference
+        The scenario's.
+    vehicle : Vehicle
+        As believed.
+    past : Past
+        From the instant before.
+    dt : scalar, s
+        Sampling period.
+
+    Attributes
+    ----------
+    outputs : dict
+        Output of each part by slot, as far as the instant has come.
+    """
+
+    def __init__(self, readings: Readings, reference: Reference, vehicle: Vehicle, past: Past, dt: Scalar) -> None:
+        self.readings, self.reference, self.vehicle, self.past, self.dt = readings, reference, vehicle, past, dt
+        self.outputs: dict[str, Any] = {}
+
+    @property
+    def estimate(self) -> Estimate:
+        """What the estimator believes."""
+        return cast("Estimate", self.outputs["estimator"])
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """What the diagnosis says, before the response to it."""
+        return cast("Diagnosis", self.outputs["diagnosis"])
+
+    @property
+    def decision(self) -> Decision:
+        """What the response to faults has decided; its diagnosis is what is believed."""
+        return cast("Decision", self.outputs["on_fault"])
+
+    @property
+    def demand(self) -> Wrench | PerRotor:
+        """What the controller asks for: a wrench, or commands of the rotors in N."""
+        return cast("Wrench | PerRotor", self.outputs["controller"].demand)
+
+    @property
+    def allocation(self) -> Allocation:
+        """What the rotors are asked for."""
+        return cast("Allocation", self.outputs["allocation"])
+
+    @cached_property
+    def expectation(self) -> Expectation:
+        """The last period as believed with sound rotors."""
+        now, thrust = motion_of(self.estimate), expected_thrust(self.past.rotors, self.vehicle)
+        return Expectation(
+            now=now,
+            previous=now if self.past.previous == () else cast("Motion", self.past.previous),
+            mean_thrust=self.past.rotors.mean,
+            thrust=thrust,
+            residual_speed=residual_speed(self.vehicle, rotor_speeds(self.vehicle, thrust)),
+            direct_acceleration_W=self.past.command.direct_acceleration_W,
+            elapsed=self.past.elapsed,
+        )
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """What the believed model explains of the last period, with the losses that are believed now."""
+        return predict(self.expectation, self.decision.diagnosis.loss, self.vehicle)

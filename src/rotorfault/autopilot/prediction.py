@@ -1,0 +1,61 @@
+"""What the believed model says of the last sampling period: the motion that it explains.
+
+What it does not explain is a fault, wind, the ground, or a wrong model; diagnosis, landing and sliding surfaces all
+start from it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.motion import angular_acceleration, drag_acceleration
+from rotorfault.model.signals import Motion
+from rotorfault.model.vehicle import Vehicle, wrench_of
+
+
+class Expectation(NamedTuple):
+    """The last sampling period as the autopilot believes that it went, with sound rotors."""
+
+    now: Motion  # as estimated
+    previous: Motion  # one period earlier; the same as `now` at the first step
+    mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the period
+    thrust: PerRotor  # N: thrust of sound rotors now
+    residual_speed: Scalar  # rad/s: believed Omega of (4)
+    direct_acceleration_W: Vec3  # m/s^2: commanded over the period, zero without the option `six_inputs`
+    elapsed: Scalar  # s: time since the last instant; 0 at the first, so that nothing is predicted there
+
+
+class Prediction(NamedTuple):
+    """Velocity changes over the last sampling period that the believed model explains; zero at the first step."""
+
+    delta_v_W: Vec3  # m/s
+    delta_omega_B: Vec3  # rad/s
+
+
+def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Prediction:
+    """Velocity changes that the believed rotors, gravity, drag and gyroscopics explain.
+
+    Parameters
+    ----------
+    expectation : Expectation
+        Of the last period.
+    loss : PerRotor
+        Believed loss of each rotor, 0 to 1.
+    vehicle : Vehicle
+        As believed.
+    """
+    e, before, now = expectation, expectation.previous, expectation.now
+    wrench = wrench_of(vehicle, e.mean_thrust * (1.0 - loss))
+    axis_W = (before.axis_W + now.axis_W) * 0.5
+    v_W = (before.v_W + now.v_W) * 0.5
+    omega_B = (before.omega_B + now.omega_B) * 0.5
+    acceleration_W = (
+        axis_W * (wrench.thrust / vehicle.mass)
+        - Vec3(0.0, 0.0, vehicle.gravity)
+        + drag_acceleration(vehicle, -v_W)
+        + e.direct_acceleration_W
+    )
+    turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
+    return Prediction(acceleration_W * e.elapsed, turn * e.elapsed)

@@ -1,0 +1,44 @@
+"""What a response to a fault is, and the slot of those that exist: it stands between diagnosis and control."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rotorfault.autopilot.instant import Decision, Instant
+from rotorfault.autopilot.prediction import Expectation
+from rotorfault.model.block import Block, MemoryT, ParametersT
+from rotorfault.model.signals import Diagnosis, Estimate, Reference
+from rotorfault.model.slot import Slot
+from rotorfault.model.vehicle import Vehicle
+
+
+class ResponseInputs(NamedTuple):
+    """All that a response to a fault may use at one sampling instant."""
+
+    estimate: Estimate
+    reference: Reference  # the scenario's
+    diagnosis: Diagnosis
+    expectation: Expectation  # what sound rotors would have done over the last period
+    vehicle: Vehicle  # belief
+
+
+class Response(Block[ResponseInputs, Decision, MemoryT, ParametersT]):
+    """Decides what is flown and what is believed once a fault is declared."""
+
+
+def _inputs(instant: Instant) -> ResponseInputs:
+    return ResponseInputs(
+        instant.estimate, instant.reference, instant.diagnosis, instant.expectation, instant.vehicle
+    )
+
+
+ON_FAULT = Slot(
+    "on_fault",
+    Response,
+    "belief",
+    "what the autopilot does about a confirmed fault",
+    "responses",
+    sort="response to a fault",
+    default="continue",
+    inputs=_inputs,
+)

@@ -1,0 +1,182 @@
+"""Code from outside the package, named by a place: ``FILE.py:NAME`` or ``package.module:NAME``.
+
+A file from a stranger must not run code: whoever loads something that names a place asks first (`allowed`), and what
+was made with code of one's own is known by the digest of its source (`source_digest`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import sys
+import sysconfig
+import traceback
+from collections.abc import Collection, Iterator
+from functools import lru_cache
+from pathlib import Path
+from types import ModuleType
+
+from rotorfault.base.errors import InputError
+
+_LOADED: dict[Path, tuple[str, ModuleType]] = {}  # by file: digest of what was run, and the module that it made
+
+
+def is_place(name: str) -> bool:
+    """Whether a name stands for a place in code, and for no registered part."""
+    return ":" in name
+
+
+def require_allowed(place: str, allow: bool | Collection[str], what: str) -> None:
+    """Refuse to go on where code would run that nobody has allowed.
+
+    Parameters
+    ----------
+    place : str
+        Where the code is.
+    allow : bool or collection of str
+        Whether any code may run, or the places that the user has named himself.
+    what : str
+        What would run, for the message: "controller", "reference function" ...
+
+    Raises
+    ------
+    InputError
+        If it is not allowed.
+    """
+    if allow is True or (not isinstance(allow, bool) and place in allow):
+        return
+    raise InputError(
+        f"the {what} is code of its own, {place}, which would run; read it, then allow it with --allow-code "
+        "(allow_code=True from Python)"
+    )
+
+
+def load(place: str, what: str) -> object:
+    """Run what a place names and give the object.
+
+    Parameters
+    ----------
+    place : str
+        ``FILE.py:NAME`` or ``package.module:NAME``.
+    what : str
+        What it is to be, for messages.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, module or name, or it raises anything.
+    """
+    source, _, name = place.rpartition(":")
+    if not source or not name.isidentifier():
+        raise InputError(f"{what} '{place}'; allowed: FILE.py:NAME or package.module:NAME")
+    try:
+        module = _file_module(Path(source), what) if source.endswith(".py") else importlib.import_module(source)
+    except InputError:
+        raise
+    except Exception as error:
+        hint = "" if source.endswith(".py") else "; install the module, or put its folder into PYTHONPATH"
+        raise InputError(f"{what} '{place}': cannot import '{source}' ({in_one_line(error)}){hint}") from error
+    if not hasattr(module, name):
+        names = [
+            key
+            for key, value in vars(module).items()
+            if isinstance(value, type) and value.__module__ == module.__name__
+        ]
+        raise InputError(f"{what} '{place}': {source} has no '{name}' (it has: {', '.join(names) or 'no classes'})")
+    found: object = getattr(module, name)
+    return found
+
+
+def _file_module(path: Path, what: str) -> ModuleType:
+    path = path.resolve()
+    if not path.is_file():
+        raise InputError(f"{what}: no such file {path}; allowed: FILE.py:NAME")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if path in _LOADED and _LOADED[path][0] == digest:
+        return _LOADED[path][1]
+    # A name of our own: a user's json.py must not stand in for the library's.
+    name = f"rotorfault_foreign_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{what}: {path} is no Python module")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    _LOADED[path] = (digest, module)
+    return module
+
+
+def in_one_line(error: BaseException) -> str:
+    """An exception in a user's code in one line, with its place."""
+    text = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    frames = traceback.extract_tb(error.__traceback__)
+    if isinstance(error, SyntaxError) or not frames:
+        return text
+    return f"{text} ({frames[-1].filename}, line {frames[-1].lineno})"
+
+
+def source_digest(thing: object) -> str:
+    """Digest of the source of a user's part: of its module, and of all modules of the user's that it can reach.
+
+    Parameters
+    ----------
+    thing : object
+        A class, function or object.
+    """
+    part = thing if isinstance(thing, type) or inspect.isfunction(thing) else type(thing)
+    digest = hashlib.sha256(f"{part.__module__}.{part.__qualname__}".encode())
+    module = sys.modules.get(part.__module__)
+    files = sorted({file for one in _reachable(module) for file in _files(one)}) if module is not None else []
+    for file in files:
+        digest.update(hashlib.sha256(file.read_bytes()).digest())
+    if not files:
+        digest.update(_own_source(part))
+    return digest.hexdigest()
+
+
+def is_own(module: str) -> bool:
+    """Whether a module belongs to this package."""
+    return module == "rotorfault" or module.startswith("rotorfault.")
+
+
+def _reachable(start: ModuleType) -> Iterator[ModuleType]:
+    """A module and the user's modules that its names lead to, without those of installed packages."""
+    seen: set[str] = set()
+    todo = [start]
+    while todo:
+        module = todo.pop()
+        if module.__name__ in seen:
+            continue
+        seen.add(module.__name__)
+        yield module
+        for value in list(vars(module).values()):
+            name = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+            other = sys.modules.get(name) if isinstance(name, str) else None
+            if other is not None and any(_files(other)):
+                todo.append(other)
+
+
+def _files(module: ModuleType) -> Iterator[Path]:
+    """The module's file, if it is a user's: not of this package, the standard library or an installed package."""
+    file = getattr(module, "__file__", None)
+    if not file or is_own(module.__name__):
+        return
+    path = Path(file)
+    if path.is_file() and not any(path.is_relative_to(folder) for folder in _installed()):
+        yield path
+
+
+@lru_cache(maxsize=1)
+def _installed() -> tuple[Path, ...]:
+    return tuple({Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
+
+
+def _own_source(part: type | object) -> bytes:
+    """Source of a part without a file, such as one made in a notebook; its bytecode where there is none."""
+    try:
+        return inspect.getsource(part).encode()  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        functions = [value for value in vars(part).values() if inspect.isfunction(value)]
+        return b"".join(f.__code__.co_code + repr(f.__code__.co_consts).encode() for f in functions)

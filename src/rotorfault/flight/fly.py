@@ -1,0 +1,226 @@
+"""Flying a scenario: one flight, or several that differ in numbers only."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rotorfault._version import __version__
+from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.autopilot.control.python_controller import as_controller
+from rotorfault.base.errors import InputError
+from rotorfault.base.foreign import is_own, source_digest
+from rotorfault.base.progress import Bar
+from rotorfault.base.versions import versions
+from rotorfault.engine import default_engine, load_engine
+from rotorfault.engine.batch import Batch, Recording
+from rotorfault.flight.assembly import Own, assemble, assemble_all
+from rotorfault.flight.flight import Flight
+from rotorfault.loop.scores import ENDS
+from rotorfault.maths.records import unflatten
+from rotorfault.results.flight_data import FORMAT, flight_data
+from rotorfault.results.outcome import Outcome, finite_or_none
+from rotorfault.results.score_table import score_table
+from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
+
+
+def fly(
+    scenario: str | Path | Mapping[str, Any] | Scenario,
+    controller: Any = None,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    engine: str | None = None,
+    seed: int | None = None,
+    allow_code: bool = False,
+) -> Flight:
+    """Fly a scenario.
+
+    Parameters
+    ----------
+    scenario : str, Path, mapping or Scenario
+        Name of a built-in scenario, path of a TOML file, tables as such a file holds, or a checked scenario.
+    controller : str or object, optional
+        Name of a registered controller, or a place in code (``FILE.py:NAME``); or your own: a block
+        (`rotorfault.Controller`) or any object with a method
+        ``update(time, estimate, reference, vehicle) -> Wrench`` (python engine only).
+    settings : mapping, optional
+        Dotted keys and values that override the scenario's, such as ``{"fault.0.loss": 0.4}``.
+    engine : str, optional
+        simd, numpy or python; the fastest that is installed if not given.
+    seed : int, optional
+        Names the random numbers of sensor noise and gusts.
+    allow_code : bool
+        Whether code that the scenario names may run; code that is named here may.
+
+    Returns
+    -------
+    Flight
+
+    Raises
+    ------
+    InputError
+        If anything that was given cannot be used; one line that says how to mend it.
+    """
+    named = controller if isinstance(controller, str) else None
+    checked = prepare(scenario, named, settings, seed, allow_code)
+    own: Own = {} if controller is None or named is not None else {CONTROLLER: as_controller(controller)}
+    batch = assemble(checked, own)
+    python_only = any(part.python_only for _, part in batch.loop.each())
+    name = engine or ("python" if python_only else default_engine(1))
+    if name != "python" and python_only:
+        raise InputError(
+            f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
+        )
+    return _flight(checked, _run(batch, name, checked.period), batch, 0, name, controller if own else None)
+
+
+def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list[Flight]:
+    """Fly scenarios that differ in numbers only, in one batch, everything recorded.
+
+    Parameters
+    ----------
+    scenarios : sequence of Scenario
+    engine : str, optional
+        simd, numpy or python; the fastest that is installed if not given.
+
+    Raises
+    ------
+    InputError
+        If they differ in more; see `rotorfault.flight.assembly.assemble_all`.
+    """
+    for scenario in scenarios:
+        if not isinstance(scenario, Scenario):
+            raise InputError(f"got {scenario!r}; allowed: Scenario objects, such as load_scenario(...) returns")
+    name = engine or default_engine(len(scenarios))
+    batch = assemble_all(scenarios)
+    recording = _run(batch, name, scenarios[0].period)
+    return [_flight(scenario, recording, batch, i, name, None) for i, scenario in enumerate(scenarios)]
+
+
+def prepare(
+    scenario: str | Path | Mapping[str, Any] | Scenario,
+    controller: str | None = None,
+    settings: Mapping[str, Any] | None = None,
+    seed: int | None = None,
+    allow_code: bool = False,
+) -> Scenario:
+    """Check a scenario with what overrides it; see `fly`."""
+    overrides: dict[str, Any] = {} if controller is None else {"controller.kind": controller}
+    if not isinstance(settings or {}, Mapping) or not all(isinstance(key, str) for key in settings or {}):
+        raise InputError(f"settings: got {settings!r}; allowed: dotted keys and values, such as {{'duration': 5.0}}")
+    if not isinstance(scenario, (str, Path, Mapping, Scenario)):
+        raise InputError(f"scenario: got {scenario!r}; allowed: a name, a path, tables or a Scenario")
+    overrides |= dict(settings or {})
+    if seed is not None:
+        overrides["seed"] = seed
+    if isinstance(scenario, (str, Path)):
+        return load_scenario(scenario, overrides, allow_code=allow_code)
+    if isinstance(scenario, Scenario) and not overrides:
+        return scenario
+    tables = scenario.as_tables() if isinstance(scenario, Scenario) else copy.deepcopy(dict(scenario))
+    override_all(tables, overrides)
+    # What is in a checked scenario was allowed when it was checked.
+    allowed = isinstance(scenario, Scenario) or allow_code
+    return scenario_from(tables, str(tables.get("name", "scenario")), allowed or named_places(overrides))
+
+
+def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = False) -> Flight:
+    """Fly again what a flight file holds.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``flight.nc``, of this version or an older one.
+    engine : str, optional
+        That of the file if not given.
+    allow_code : bool
+        Whether code that the file names may run.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, names code that is not allowed, or was flown by a controller that is not in it.
+    """
+    from rotorfault.results.dataset import read_configuration
+
+    tables, attributes = read_configuration(path)
+    if attributes.get("own_controller"):
+        raise InputError(
+            f"{path}: was flown by your own controller '{attributes['own_controller']}', which a file cannot hold; "
+            "fly it with rotorfault.fly(scenario, controller=...)"
+        )
+    scenario = scenario_from(tables, str(path), allow_code)
+    return fly(scenario, engine=engine or str(attributes["engine"]))
+
+
+def _run(batch: Batch, engine: str, period: float) -> Recording:
+    with Bar("flying", batch.steps * period, "s") as bar:
+
+        def watch(done: int) -> bool:
+            bar.update(done * period)
+            return False
+
+        return load_engine(engine)(batch, watch)
+
+
+def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, engine: str, own: Any) -> Flight:
+    # Scores of one flight are those of a batch of one: the same code counts and reads them.
+    scores = score_table(batch, recording.state).row(index)
+    over = unflatten(batch.state, recording.state[:, index].tolist()).scores
+    signals, times = recording.signals[:, :, index], recording.steps * scenario.period
+    outcome = Outcome(str(scores["outcome"]), float(scores["end_time"]))
+    end = len(times)
+    if ENDS[int(over.over)] != "flying":
+        # The record of the end itself (the first from it on) is kept where it has numbers, and the first in any case.
+        end = min(int(np.searchsorted(recording.steps, over.end)) + 1, len(times))
+        end = max(1, end - (1 if not np.isfinite(signals[end - 1]).all() else 0))
+    elif recording.interrupted:
+        outcome = Outcome("interrupted", float(times[-1]))
+    attributes = _attributes(scenario, engine, own) | {
+        "outcome": outcome.kind,
+        "end_time": outcome.time,
+        "scores": json.dumps(finite_or_none(scores)),
+    }
+    data = flight_data(batch.loop.layout, signals[:end], times[:end], attributes)
+    return Flight(data, outcome, scores, scenario)
+
+
+def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
+    """What a flight file says of itself."""
+    vehicle, controller = scenario.vehicle.vehicle, scenario[CONTROLLER]
+    name = controller.kind if own is None else type(own).__name__
+    parts = [
+        {"slot": slot.name, "kind": part.kind, "preset": part.preset, "source": part.source}
+        for slot, part in scenario.parts()
+        if own is None or slot is not CONTROLLER
+    ]
+    if own is not None:
+        source = "" if is_own(type(own).__module__) else source_digest(own)
+        parts.append({"slot": CONTROLLER.name, "kind": name, "preset": "", "source": source})
+    decision = getattr(scenario.diagnosis.settings, "decision", None)
+    return {
+        "format": FORMAT,
+        "title": f"{scenario.name} flown by {name}",
+        "scenario": scenario.name,
+        "controller": name,
+        "preset": controller.preset if own is None else "",
+        "own_controller": name if own is not None else "",
+        "parts": json.dumps(parts),
+        "plant": scenario.plant.kind,
+        "vehicle": scenario.vehicle.name,
+        "engine": engine,
+        "seed": scenario.seed,
+        "version": __version__,
+        "versions": json.dumps(versions()),
+        "thrust_min": vehicle.thrust_min,
+        "thrust_max": vehicle.thrust_max,
+        "threshold": float(getattr(decision, "threshold", 0.0)),
+        "configuration": json.dumps(scenario.as_tables()),
+    }

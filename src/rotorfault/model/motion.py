@@ -1,0 +1,96 @@
+r"""Functions of a vehicle that truth and belief share: Newton's and Euler's right-hand sides, drag, hold and limits.
+
+.. math:: a_{drag} = \frac{k_d}{m}(v_{air} - v), \qquad
+          J\dot\omega = \tau + \tau_{gyro} - \omega\times J\omega
+
+Truth and belief each call them with their own numbers; that the functions are the same is no knowledge of the truth.
+The paper gives no force law for its wind of fixed velocity; linear drag is the reading taken (docs/paper.md, 5.1).
+"""
+
+from __future__ import annotations
+
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, clip, exp
+from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
+
+
+def drag_acceleration(vehicle: Vehicle, airspeed_W: Vec3) -> Vec3:
+    """Acceleration by drag in m/s^2, world frame.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its mass and drag coefficient.
+    airspeed_W : Vec3, m/s, world frame
+        Velocity of the air relative to the vehicle.
+    """
+    drag_W: Vec3 = airspeed_W * (vehicle.linear_drag / vehicle.mass)
+    return drag_W
+
+
+def torque_of_motion(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) -> Vec3:
+    """What turns the body without any torque from outside: gyroscopic torque less omega x J omega, in N m.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its inertia and that of its rotors.
+    omega_B : Vec3, rad/s
+        Body rates.
+    residual_speed : scalar, rad/s
+        Sum of the signed rotor speeds, Omega of (4).
+    """
+    spin = omega_B.cross(vehicle.inertia.times(omega_B))
+    return gyroscopic_torque(vehicle, omega_B, residual_speed) - spin
+
+
+def angular_acceleration(vehicle: Vehicle, torque_B: Vec3, omega_B: Vec3, residual_speed: Scalar) -> Vec3:
+    """Angular acceleration in rad/s^2, body frame, for a torque in N m; (1), and the attitude rows of (3).
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its inertia and that of its rotors.
+    torque_B : Vec3, N m
+        Of rotors and contact.
+    omega_B : Vec3, rad/s
+        Body rates.
+    residual_speed : scalar, rad/s
+        Sum of the signed rotor speeds, Omega of (4).
+    """
+    return (torque_B + torque_of_motion(vehicle, omega_B, residual_speed)).over(vehicle.inertia)
+
+
+def limited(vehicle: Vehicle, command: PerRotor) -> PerRotor:
+    """Commands in N put within the rotor limits."""
+    return command.map(lambda c: clip(c, vehicle.thrust_min, vehicle.thrust_max))
+
+
+def effect_of(vehicle: Vehicle, loss: PerRotor) -> PerRotor:
+    """Steady thrust per commanded thrust of each rotor, (1 - loss) k of (7), (8)."""
+    return loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
+
+
+def lag_held(output: Scalar, entering: Scalar, bandwidth: Scalar, dt: Scalar) -> tuple[Scalar, Scalar]:
+    r"""A first-order lag whose input is held for a period, exactly.
+
+    .. math:: v(T) = u + (v(0) - u)\,e^{-wT}, \qquad \bar v = u + (v(0) - u)\frac{1 - e^{-wT}}{wT}
+
+    Parameters
+    ----------
+    output : scalar
+        At the beginning of the period.
+    entering : scalar
+        Held over it, in the unit of `output`.
+    bandwidth : scalar, rad/s
+    dt : scalar, s
+        Length of the period.
+
+    Returns
+    -------
+    end, mean : scalar
+        Output at the end of the period, and its mean over it.
+    """
+    decay = exp(-bandwidth * dt)
+    gap = output - entering
+    return entering + gap * decay, entering + gap * ((1.0 - decay) / (bandwidth * dt))

@@ -1,0 +1,139 @@
+"""Slots: the kinds of parts that a flight has, each with its place, its base class and its registry.
+
+A slot's name is its key in a scenario and the prefix of its parts' signals. What iterates over the parts of a flight
+(assembly, sweeps, structure, catalogue, conformance, documentation) iterates over slots; the list of all slots is
+`rotorfault.scenario.slots`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Generic, Literal, TypeVar, final
+
+from rotorfault.base.errors import InputError
+from rotorfault.base.registry import Kind, Registry
+from rotorfault.model.block import Nothing, Record
+
+B = TypeVar("B")
+
+Side = Literal["task", "truth", "belief"]
+"""Of a slot: what is to be done, what is so, what the autopilot makes of it."""
+
+
+@final
+class Slot(Generic[B]):
+    """A kind of part.
+
+    Parameters
+    ----------
+    name : str
+        Key in a scenario, such as "wind".
+    base : type
+        What its parts derive from.
+    side : {"task", "truth", "belief"}
+    about : str
+        One line for the table of a scenario's keys.
+    group : str
+        Plural for ``rotorfault list``, such as "winds".
+    sort : str, optional
+        Singular for messages; the name if not given.
+    default : str, optional
+        Part of a scenario that names none. A slot without default is required, or empty if `optional`.
+    many : bool
+        Whether a scenario has any number of such parts, in a list.
+    optional : bool
+        Whether a scenario may have none.
+    streams : (int, int)
+        Words that tell the random numbers of a flight's steps, and of its start, from those of other slots.
+    shorthand : callable, optional
+        Turns what may stand for a table in a scenario (a bare number, say) into the table; leaves the rest alone.
+    presets : callable, optional
+        Presets of a part by name, each a table of settings.
+    inputs : callable, optional
+        For the autopilot's slots: the inputs of a part, from what is known at its place in the sampling instant
+        (`rotorfault.autopilot.autopilot.Instant`).
+    """
+
+    def __init__(
+        self,
+        name: str,
+        base: type[B],
+        side: Side,
+        about: str,
+        group: str,
+        *,
+        sort: str | None = None,
+        default: str | None = None,
+        many: bool = False,
+        optional: bool = False,
+        streams: tuple[int, int] = (0, 0),
+        shorthand: Callable[[Any], Any] | None = None,
+        presets: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
+        inputs: Callable[[Any], Any] | None = None,
+    ) -> None:
+        self.name: Final = name
+        self.base: Final = base
+        self.side: Final[Side] = side
+        self.about: Final = about
+        self.group: Final = group
+        self.default: Final = default
+        self.many: Final = many
+        self.optional: Final = optional
+        self.streams: Final = streams
+        self.shorthand: Final = shorthand
+        self.presets: Final = presets
+        self.inputs: Final = inputs
+        self.registry: Final[Registry[B]] = Registry(sort or name, name)
+        base.slot = self  # type: ignore[attr-defined]
+
+    def __repr__(self) -> str:
+        return f"<slot {self.name}: {', '.join(self.registry)}>"
+
+
+Part = TypeVar("Part", bound=type[Any])
+
+
+def register(name: str) -> Callable[[Part], Part]:
+    """Decorator that makes a part available under a name in scenarios and on the command line.
+
+    The class derives from the base of its kind (`Controller`, `Wind`, ...), which says where it belongs. The last
+    registration of a name holds.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    InputError
+        If the class derives from no kind of part.
+    """
+
+    def keep(part: Part) -> Part:
+        slot_of(part).registry.add(name, part)
+        return part
+
+    return keep
+
+
+def slot_of(part: object) -> Slot[Any]:
+    """The slot that a part, or a class of parts, belongs to.
+
+    Raises
+    ------
+    InputError
+        If it derives from no kind of part.
+    """
+    slot = getattr(part, "slot", None)
+    if not isinstance(slot, Slot):
+        name = part.__name__ if isinstance(part, type) else type(part).__name__
+        raise InputError(
+            f"{name} derives from no kind of part; derive it from rotorfault.Controller, Wind, Fault, Estimator ..."
+        )
+    return slot
+
+
+def telemetry_of(kind: Kind[Any]) -> type[Record]:
+    """Signals that the parts of a kind record."""
+    telemetry: type[Record] = getattr(kind, "Telemetry", Nothing)
+    return telemetry

@@ -1,0 +1,91 @@
+"""Scenarios by name and from files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from rotorfault.base.config import parse_toml, read_text
+from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.foreign import is_place
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
+from rotorfault.scenario.slots import SLOTS
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with rotorfault."""
+    folder = resources.files("rotorfault.scenario.builtin")
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_scenario(
+    name_or_path: str | Path, overrides: Mapping[str, Any] | None = None, *, allow_code: bool = False
+) -> Scenario:
+    """Load and check a scenario.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a built-in scenario, or a path that ends in ``.toml``. Paths in a file are relative to it.
+    overrides : mapping, optional
+        Dotted keys and their values, such as ``{"wind.kind": "none", "fault.0.loss": 0.3}``.
+    allow_code : bool
+        Whether code that the scenario names may run; code that the overrides name may.
+
+    Raises
+    ------
+    InputError
+        If there is no such scenario, or it is not right; one line with file and key.
+    """
+    if str(name_or_path).endswith(".toml"):
+        where, text, folder = str(name_or_path), read_text(name_or_path), Path(name_or_path).parent
+    else:
+        name, names = str(name_or_path), scenario_names()
+        if name not in names:
+            raise InputError(f"{unknown('scenario', name, names)}; or give a path that ends in .toml")
+        where, folder = f"{name}.toml", None
+        text = (resources.files("rotorfault.scenario.builtin") / where).read_text(encoding="utf-8")
+    tables = parse_toml(text, where)
+    if folder is not None:
+        _relative_to(folder, tables)
+    override_all(tables, overrides or {})
+    return scenario_from(tables, where, allow_code or named_places(overrides or {}))
+
+
+def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
+    """Make the paths in a scenario file relative to the file."""
+    vehicle, reference = tables.get("vehicle"), tables.get("reference")
+    if isinstance(vehicle, str) and vehicle.endswith(".toml"):
+        tables["vehicle"] = str(folder / vehicle)
+    if isinstance(reference, dict) and isinstance(reference.get("file"), str):
+        reference["file"] = str(folder / reference["file"])
+    for slot in SLOTS:
+        part = tables.get(slot.name)
+        for table in part if isinstance(part, list) else [part]:
+            if isinstance(table, dict) and _is_file(table.get("kind")):
+                table["kind"] = str(folder / table["kind"])
+        if _is_file(part):
+            tables[slot.name] = str(folder / str(part))
+
+
+def _is_file(kind: object) -> bool:
+    return isinstance(kind, str) and is_place(kind) and kind.rpartition(":")[0].endswith(".py")
+
+
+def new_scenario(name: str) -> str:
+    """Text of a scenario file to start from: commented, and valid as it stands.
+
+    Raises
+    ------
+    InputError
+        If the name is empty or contains quotation marks, backslashes or line breaks.
+    """
+    if not name or any(character in '"\\' or not character.isprintable() for character in name):
+        raise InputError(
+            f"scenario name {name!r}; allowed: printable characters without quotation marks or backslash"
+        )
+    template = (resources.files("rotorfault.scenario.builtin") / "template.txt").read_text(encoding="utf-8")
+    return template.replace("NAME", name)

@@ -1,0 +1,89 @@
+"""Dotted keys and values in place of what a scenario's tables say."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+from rotorfault.base.errors import InputError
+from rotorfault.model.vehicle_file import load_vehicle
+
+
+def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Set several dotted keys in tables, in place: whole tables and kinds first, for they drop what was in them."""
+
+    def outermost_first(key: str) -> tuple[int, bool]:
+        *path, last = key.split(".")
+        return (len(path), False) if last == "kind" else (len(path) + 1, True)
+
+    for key in sorted(changes, key=outermost_first):
+        override(tables, key, changes[key])
+
+
+def override(tables: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key in tables, in place.
+
+    Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
+    below it is set (``vehicle.rotor_bandwidth.value``). Setting ``kind``, or a table that has one to a bare name,
+    drops the other settings of that table: they belonged to another kind.
+
+    Raises
+    ------
+    InputError
+        If the key leads into something that is not a table or a list, or past the end of a list.
+    """
+    *path, last = key.split(".")
+    here: Any = tables
+    for depth, part in enumerate(path):
+        if isinstance(here, list):
+            here = here[_index(here, part, key)]
+        elif isinstance(here, dict):
+            inner = here.get(part)
+            if here is tables and part == "vehicle" and isinstance(inner, str):
+                # A vehicle's name stands for its file: laid out here, so that single numbers of it can be set.
+                inner = here[part] = load_vehicle(inner).model_dump(mode="json")
+            if (isinstance(inner, str) and depth == len(path) - 1) or inner is None:
+                # A bare name stands for a table with that kind.
+                inner = here[part] = {} if inner is None else {"kind": inner}
+            here = inner
+        else:
+            raise InputError(f"{key}: '{'.'.join(path[:depth])}' is a single value; it has no key '{part}'")
+    if isinstance(here, list):
+        here[_index(here, last, key)] = value
+    elif not isinstance(here, dict):
+        raise InputError(f"{key}: '{'.'.join(path)}' is a single value; it has no key '{last}'")
+    elif last == "kind" and here.get("kind") != value:
+        here.clear()
+        here["kind"] = value
+    else:
+        if key == "reference.file":
+            # The text that a checked scenario holds is that of the former file.
+            here.pop("text", None)
+        here[last] = value
+
+
+def _index(items: list[Any], part: str, key: str) -> int:
+    if not part.isdigit() or int(part) >= len(items):
+        raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}")
+    return int(part)
+
+
+def parse_overrides(pairs: list[str]) -> dict[str, Any]:
+    """Overrides from ``key=value`` texts; a value is read as TOML, or taken as text where it is none.
+
+    Raises
+    ------
+    InputError
+        If a text has no '=' or no key.
+    """
+    found: dict[str, Any] = {}
+    for pair in pairs:
+        key, equals, text = pair.partition("=")
+        if not equals or not key.strip() or not all(key.strip().split(".")):
+            raise InputError(f"--set {pair}: allowed: key=value with a dotted key, such as fault.0.loss=0.3")
+        try:
+            found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key.strip()] = text.strip()
+    return found

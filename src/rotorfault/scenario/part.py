@@ -1,0 +1,189 @@
+"""A part as a scenario names it: which one, with which settings, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import lru_cache
+from typing import Annotated, Any, Generic, TypeVar, cast, final
+
+from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, ValidationInfo
+from pydantic.fields import FieldInfo
+
+from rotorfault.base import foreign
+from rotorfault.base.config import Strict, passed_on, refusal
+from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.registry import Kind
+from rotorfault.model.slot import Slot, slot_of
+
+B = TypeVar("B")
+DEFAULT_PRESET = "tuned"
+NO_PRESET = "none"
+
+
+@final
+class Part(Generic[B]):
+    """A part of a scenario: what a table with ``kind`` becomes.
+
+    Parameters
+    ----------
+    slot : Slot
+    kind : str
+        Name in the slot's registry, or a place in code.
+    settings : Strict
+        Checked.
+    preset : str
+        Name of the preset that its settings started from; empty where there are no presets.
+    factory : Kind, optional
+        Makes the part, where `kind` is a place in code.
+    """
+
+    def __init__(
+        self, slot: Slot[B], kind: str, settings: Strict, preset: str = "", factory: Kind[B] | None = None
+    ) -> None:
+        self.slot, self.kind, self.settings, self.preset = slot, kind, settings, preset
+        self._factory = factory
+
+    def __repr__(self) -> str:
+        preset = f", preset {self.preset}" if self.preset else ""
+        return f"<{self.slot.registry.sort} {self.kind}{preset}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Part) and self.as_table() == other.as_table()
+
+    def __hash__(self) -> int:
+        return hash((self.slot.name, self.kind))
+
+    @property
+    def factory(self) -> Kind[B]:
+        """What makes the part of its settings."""
+        return self.slot.registry[self.kind] if self._factory is None else self._factory
+
+    def make(self) -> B:
+        """The part itself."""
+        return self.factory(self.settings)
+
+    def with_settings(self, settings: Strict) -> Part[B]:
+        """The same kind of part with other settings."""
+        return Part(self.slot, self.kind, settings, self.preset, self._factory)
+
+    def as_table(self) -> dict[str, Any]:
+        """The table that this part is read from: all its settings, and the preset that they started from."""
+        # With None where a setting has none: a preset must not fill it when the table is read again.
+        table = {"kind": self.kind, **self.settings.model_dump(mode="json")}
+        return table | ({"preset": self.preset} if self.preset else {})
+
+    @property
+    def source(self) -> str:
+        """Digest of the source, for a part from outside the package; empty for one of the package's own."""
+        factory = self.factory
+        home = getattr(factory, "__module__", type(factory).__module__)
+        return "" if foreign.is_own(home) else foreign.source_digest(factory)
+
+
+def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
+    """A part from what stands in a scenario: a table with ``kind``, or a bare name.
+
+    A table without ``kind`` is one of the default kind, where there is one.
+
+    Parameters
+    ----------
+    slot : Slot
+    value : str, mapping or Part
+    allow : bool or collection of str
+        Whether code from outside may run, or which.
+
+    Raises
+    ------
+    PydanticCustomError
+        If it is not right; names the key.
+    """
+    if isinstance(value, Part):
+        return cast("Part[B]", value)
+    if slot.shorthand is not None:
+        value = slot.shorthand(value)
+    table = {"kind": value} if isinstance(value, str) else value
+    names = list(slot.registry)
+    if not isinstance(table, Mapping):
+        raise refusal("", f"got {value!r}; allowed: a table with 'kind', or a name: {', '.join(names)}")
+    if "kind" not in table and slot.default is not None:
+        table = {"kind": slot.default, **table}
+    if "kind" not in table:
+        raise refusal("kind", f"is missing; allowed: {', '.join(names)}")
+    kind = table["kind"]
+    if not isinstance(kind, str) or not (foreign.is_place(kind) or kind in slot.registry):
+        raise refusal("kind", unknown(slot.registry.sort, kind, names))
+    settings = {key: item for key, item in table.items() if key != "kind"}
+    try:
+        factory = _foreign(slot, kind, allow) if foreign.is_place(kind) else None
+        made: Kind[B] = slot.registry[kind] if factory is None else factory
+        preset = settings.pop("preset", None) if slot.presets is not None else None
+        preset, settings = _with_preset(slot, kind, preset, settings, made)
+        checked = made.Settings.model_validate(settings)
+        for place in checked.code():
+            foreign.require_allowed(place, allow, f"{slot.registry.sort} {kind}")
+        return Part(slot, kind, checked, preset, factory)
+    except ValidationError as error:
+        raise passed_on(error) from None
+    except InputError as error:
+        raise refusal("", str(error)) from None
+
+
+def _foreign(slot: Slot[B], place: str, allow: bool | Collection[str]) -> Kind[B]:
+    foreign.require_allowed(place, allow, slot.registry.sort)
+    part = foreign.load(place, slot.registry.sort)
+    home = slot_of(part)
+    if home is not slot or not callable(part):
+        raise InputError(
+            f"{slot.registry.sort} '{place}' is a {home.registry.sort}; allowed: a class that derives from "
+            f"rotorfault.{slot.base.__name__}"
+        )
+    return cast("Kind[B]", part)
+
+
+def _with_preset(
+    slot: Slot[Any], kind: str, preset: Any, settings: dict[str, Any], factory: Kind[Any]
+) -> tuple[str, dict[str, Any]]:
+    """Name of the preset, and the settings with it put under them."""
+    known = {} if slot.presets is None else slot.presets(kind)
+    if preset is not None and not isinstance(preset, str):
+        raise refusal("preset", f"got {preset!r}; allowed: the name of a preset")
+    if preset is None:
+        preset = DEFAULT_PRESET if DEFAULT_PRESET in known else NO_PRESET if known else ""
+    if preset in known:
+        return preset, _merged(known[preset], settings)
+    # A table that holds every setting needs no preset to be looked up: its name says where they come from.
+    complete = set(settings) >= set(factory.Settings.model_fields)
+    if preset not in ("", NO_PRESET) and not complete:
+        raise refusal("preset", unknown("preset", preset, [*known, NO_PRESET]))
+    return preset, settings
+
+
+def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(under)
+    for key, value in over.items():
+        below = merged.get(key)
+        merged[key] = _merged(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
+    return merged
+
+
+@lru_cache(maxsize=64)
+def field_of(slot: Slot[Any]) -> tuple[Any, FieldInfo]:
+    """Type and description of a scenario's key for a slot."""
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        allow = (info.context or {}).get("allow_code", False)
+        if slot.optional and (value is None or value == "none"):
+            return None
+        return read(slot, value, allow)
+
+    def dump(part: Any) -> Any:
+        return None if part is None else part.as_table()
+
+    one: Any = Annotated[Any, BeforeValidator(check), PlainSerializer(dump)]
+    if slot.many:
+        return tuple[one, ...], Field(default=(), description=slot.about)
+    if slot.optional:
+        return one, Field(default=None, description=slot.about)
+    if slot.default is None:
+        return one, Field(description=slot.about)
+    return one, Field(default=slot.default, validate_default=True, description=slot.about)

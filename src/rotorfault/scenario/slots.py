@@ -1,0 +1,65 @@
+"""All kinds of parts that a flight has, in the order in which they act.
+
+A new kind of part is a slot in a file of its own and a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, final
+
+from rotorfault.autopilot.allocation import ALLOCATION
+from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.autopilot.diagnosis import DIAGNOSIS
+from rotorfault.autopilot.estimation import ESTIMATOR
+from rotorfault.autopilot.response import ON_FAULT
+from rotorfault.base.errors import InputError, unknown
+from rotorfault.model.slot import Slot
+from rotorfault.plant import FAULT, GROUND, PLANT, SENSORS, WIND
+from rotorfault.reference import REFERENCE
+
+
+@final
+class Slots:
+    """Slots in order, by name."""
+
+    def __init__(self, slots: tuple[Slot[Any], ...]) -> None:
+        self._slots = list(slots)
+        self.version = 0  # rises with every change
+
+    def __iter__(self) -> Iterator[Slot[Any]]:
+        return iter(self._slots)
+
+    def __len__(self) -> int:
+        return len(self._slots)
+
+    def __contains__(self, name: object) -> bool:
+        return any(slot.name == name for slot in self._slots)
+
+    def __getitem__(self, name: str) -> Slot[Any]:
+        """A slot by its name.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for slot in self._slots:
+            if slot.name == name:
+                return slot
+        raise InputError(unknown("kind of part", name, [slot.name for slot in self._slots]))
+
+    def insert(self, slot: Slot[Any], after: str) -> None:
+        """Give a new kind of part its place, behind that of another."""
+        self._slots.insert(1 + self._slots.index(self[after]), slot)
+        self.version += 1
+
+    def remove(self, slot: Slot[Any]) -> None:
+        """Take a kind of part away again."""
+        self._slots.remove(slot)
+        self.version += 1
+
+
+SLOTS = Slots(
+    (REFERENCE, WIND, FAULT, GROUND, PLANT, SENSORS, ESTIMATOR, DIAGNOSIS, ON_FAULT, CONTROLLER, ALLOCATION)
+)
