@@ -1,8 +1,15 @@
 # Targets of rotorfault; `make` alone lists them. Everything is installed into virtual environments in this folder.
 
+# Windows, where make runs from Git Bash, has its own names for Python and for the folder of an environment's commands.
+ifeq ($(OS),Windows_NT)
+PYTHON ?= python
+BIN := Scripts
+else
 PYTHON ?= python3
-PIP := .venv/bin/python -m pip --disable-pip-version-check
-NUMPY_PIP := .venv-numpy/bin/python -m pip --disable-pip-version-check
+BIN := bin
+endif
+PIP := .venv/$(BIN)/python -m pip --disable-pip-version-check
+NUMPY_PIP := .venv-numpy/$(BIN)/python -m pip --disable-pip-version-check
 # Two test processes on two cores: more threads in BLAS only wait for each other.
 export OPENBLAS_NUM_THREADS := 1
 
@@ -11,7 +18,7 @@ export OPENBLAS_NUM_THREADS := 1
 .PHONY: help venv paper test test-numpy lint types bench peers maps benchmarks clean check-python
 
 help: ## List the targets
-	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-14s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 check-python:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -41,39 +48,39 @@ check-python:
 venv: .venv/.stamp-develop ## Create .venv with rotorfault, the tests' and the developers' tools
 
 paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and claim
-	.venv/bin/rotorfault paper --out results/paper
+	.venv/$(BIN)/rotorfault paper --out results/paper
 
 test: .venv/.stamp-develop ## Run the tests
-	.venv/bin/python -m pytest -n 2
+	.venv/$(BIN)/python -m pytest -n 2
 
 test-numpy: .venv-numpy/.stamp ## Run the tests without llvmlite, in .venv-numpy
-	.venv-numpy/bin/python -m pytest -n 2
+	.venv-numpy/$(BIN)/python -m pytest -n 2
 
 lint: .venv/.stamp-develop ## Check style and format with ruff
-	.venv/bin/ruff check
-	.venv/bin/ruff format --check
+	.venv/$(BIN)/ruff check
+	.venv/$(BIN)/ruff format --check
 
 types: .venv/.stamp-develop ## Check types with mypy
-	.venv/bin/mypy
+	.venv/$(BIN)/mypy
 
 .venv/.stamp-bench: .venv/.stamp-develop
 	$(PIP) install --quiet -c constraints.txt -e '.[bench]'
 	@touch $@
 
 bench: .venv/.stamp-bench ## Measure speed and accuracy on this machine
-	.venv/bin/rotorfault bench --json results/bench.json --figure results/error-cost.png
+	.venv/$(BIN)/rotorfault bench --json results/bench.json --figure results/error-cost.png
 
 peers: .venv/.stamp-bench ## The same beside crazyflow, RotorPy and l2f (installs 8 GB on first use)
-	.venv/bin/rotorfault bench --peers --json results/bench.json --figure results/error-cost.png
+	.venv/$(BIN)/rotorfault bench --peers --json results/bench.json --figure results/error-cost.png
 
 maps: .venv/.stamp-fly ## Fly the built-in survival campaigns
 	for study in partial-loss-map two-rotors detection-worth mass-inertia; do \
-	  .venv/bin/rotorfault campaign $$study --out results/campaigns/$$study || exit 1; done
+	  .venv/$(BIN)/rotorfault campaign $$study --out results/campaigns/$$study || exit 1; done
 
 benchmarks: .venv/.stamp-develop ## Run every script in benchmarks/
 	@for script in benchmarks/*.py; do \
 	  [ -e "$$script" ] || { echo "There are no benchmarks yet."; break; }; \
-	  echo "$$script"; .venv/bin/python "$$script" || exit 1; \
+	  echo "$$script"; .venv/$(BIN)/python "$$script" || exit 1; \
 	done
 
 clean: ## Remove what tools made; keeps the virtual environments and results
