@@ -11,12 +11,11 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from places import SOURCE
 
-import rotorfault
 from rotorfault.engine import have_simd
 
 pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
-SOURCE = str(Path(rotorfault.__file__).parents[1])
 STUDY = """
 name = "tiny"
 scenario = "hover-fault"
@@ -53,7 +52,7 @@ width = 0.5
 def call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "rotorfault.cli.main", *arguments],
-        cwd=folder, env={**os.environ, "PYTHONPATH": SOURCE}, capture_output=True, text=True, check=False,
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(SOURCE.parent)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 

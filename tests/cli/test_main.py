@@ -13,8 +13,6 @@ import pytest
 import rotorfault as rf
 from rotorfault.cli import main as cli
 
-ROOT = Path(__file__).parent.parent
-
 
 def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "rotorfault.cli.main", *arguments]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from places import SOURCE
 
 import rotorfault
 from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings, limited_force
@@ -521,7 +522,7 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
         f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
         "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
     )
-    root = str(Path(rotorfault.__file__).parents[1])
+    root = str(SOURCE.parent)
     environment = {**os.environ, "PYTHONPATH": root}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

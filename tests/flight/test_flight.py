@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import GOLDEN
 
 import rotorfault as rf
 from rotorfault.model.telemetry import quantities
 
-GOLDEN = Path(__file__).parent / "golden"
 SHORT = {"duration": 0.5}
 REQUIRED = {
     "outcome", "survived", "end_time", "settle_time", "position_mse", "attitude_mse", "attitude_demand_mse", "cost",

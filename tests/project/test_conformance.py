@@ -84,7 +84,7 @@ def _value(kind: Any, metadata: list[Any], folder: Path, rising: Iterator[int]) 
         return example(kind, folder)
     if kind is Callable or origin is Callable or "Callable" in repr(kind):
         return lambda time: (0.1 * time, 0.0, 0.2 * time * time, 0.0)
-    raise NotImplementedError(f"teach tests/test_conformance.py an example of {kind!r}")
+    raise NotImplementedError(f"teach tests/project/test_conformance.py an example of {kind!r}")
 
 
 def _within(value: float, metadata: list[Any]) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import typer.main
+from places import DOCS, ROOT, SOURCE
 
 import rotorfault as rf
 from rotorfault.autopilot.control.cascade import CascadeSettings
@@ -25,9 +26,7 @@ from rotorfault.cli.main import app
 from rotorfault.flight.flight import prepare
 from rotorfault.scenario.scenario import parse_overrides, scenario_from
 
-ROOT = Path(__file__).parents[1]
-SOURCE = ROOT / "src" / "rotorfault"
-PAGES = [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "README.md"]
+PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
 TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGE_OF = {
@@ -84,7 +83,7 @@ def anchors(path: Path) -> set[str]:
 
 def section(page: str, kind: str) -> str:
     """Text below the heading that names a kind, up to the next heading of the same or a higher level."""
-    text = TEXT[ROOT / "docs" / page]
+    text = TEXT[DOCS / page]
     title = kind.replace("_", "[_ ]")
     for match in re.finditer(rf"^(#+) {title}\b.*$", text, re.MULTILINE | re.IGNORECASE):
         rest = text[match.end() :]
@@ -116,7 +115,7 @@ def test_every_part_has_a_section_with_all_its_settings(group: str, kind: str) -
 
 @pytest.mark.parametrize("kind", list(REGISTRIES["controllers"]))
 def test_every_controller_has_a_page_with_all_its_settings(kind: str) -> None:
-    page, index = ROOT / "docs" / "controllers" / f"{kind}.md", ROOT / "docs" / "controllers" / "index.md"
+    page, index = DOCS / "controllers" / f"{kind}.md", DOCS / "controllers" / "index.md"
     for title in ("Equations", "Settings", "Presets", "Where it differs from the paper", "When it fails"):
         assert f"\n## {title}\n" in TEXT[page], title
     law = REGISTRIES["controllers"][kind].Settings.model_fields["law"].annotation
@@ -152,7 +151,7 @@ def test_what_is_listed_is_named(group: str) -> None:
 
 
 def test_summary_and_outcomes_are_defined() -> None:
-    text = TEXT[ROOT / "docs" / "scenarios.md"]
+    text = TEXT[DOCS / "scenarios.md"]
     settings = {"duration": 0.02, "fault.0.time": 0.0, "fault.1.time": 0.01}
     summary = rf.fly("paper-set-point", settings=settings, engine="python").summary()
     assert summary["detections"]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import EXAMPLES
 
 import rotorfault as rf
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
 SHORT = {"duration": 0.3}
 
 

@@ -20,6 +20,7 @@ from figure_checks import (
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
+from places import SOURCE
 
 from rotorfault.base.errors import InputError
 from rotorfault.report import figures, panels, style
@@ -287,5 +288,5 @@ def test_global_settings_are_left_alone(tmp_path: Path) -> None:
     before = dict(mpl.rcParams)
     figures.save({"position": figures.draw(made_up(duration=1.0))["position"]}, tmp_path)
     assert dict(mpl.rcParams) == before
-    for path in Path(figures.__file__).parent.glob("*.py"):
+    for path in (SOURCE / "report").glob("*.py"):
         assert "pyplot" not in path.read_text(encoding="utf-8"), path

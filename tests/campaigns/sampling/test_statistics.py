@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest, ttest_rel
 
 from rotorfault.base.errors import InputError
-from rotorfault.campaigns import paired, statistics
+from rotorfault.campaigns.sampling import paired, statistics
 from rotorfault.campaigns.sampling.statistics import (
     INTERVALS,
     clopper_pearson,

@@ -23,19 +23,20 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from campaign_studies import TINY
+from places import DOCS, HELPERS
 
 import rotorfault
 from rotorfault.base.errors import InputError
 from rotorfault.base.versions import source_digest
-from rotorfault.campaigns import identity as identity_module
-from rotorfault.campaigns import parquet
+from rotorfault.campaigns.store import identity as identity_module
+from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.store.lock import Lock
 from rotorfault.campaigns.store.parquet import content_digest
 from rotorfault.campaigns.store.store import Key, Store
 
 STUDY: dict[str, Any] = {"name": "test", "wind": {"speed": 5.0}, "losses": [0.1, 0.2]}
 BLOCKS: list[Key] = [*((0, block) for block in range(6)), *((1, block) for block in range(4))]
-DOC = Path(__file__).parents[1] / "docs" / "campaign-files.md"
+DOC = DOCS / "campaign-files.md"
 
 needs_posix = pytest.mark.skipif(os.name == "nt", reason="needs signals and limits of POSIX")
 
@@ -231,8 +232,8 @@ def test_a_block_without_flights_is_done(tmp_path: Path) -> None:
 WRITER = """
 import os, random, signal, sys, time
 from pathlib import Path
-sys.path.insert(0, {tests!r})
-from test_campaign_store import BLOCKS, STUDY, Store, results, start
+sys.path[:0] = {paths!r}
+from test_store import BLOCKS, STUDY, Store, results, start
 folder = Path({folder!r})
 known = (folder / "study.json").exists()
 store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
@@ -248,7 +249,7 @@ time.sleep(600)
 
 
 def writer(folder: Path, seed: int = 0, trap: str = "") -> subprocess.Popen[str]:
-    code = WRITER.format(tests=str(Path(__file__).parent), folder=str(folder), seed=seed, trap=trap)
+    code = WRITER.format(paths=[str(Path(__file__).parent), str(HELPERS)], folder=str(folder), seed=seed, trap=trap)
     return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
 
 
