@@ -135,5 +135,5 @@ def test_products_are_fused_where_nobody_else_sees_them() -> None:
 
 
 def test_a_symbol_cannot_be_asked_for_its_truth() -> None:
-    with pytest.raises(TypeError, match=r"use rotorfault\.scalar\.select"):
+    with pytest.raises(TypeError, match=r"use rotorfault\.maths\.scalar\.select"):
         CompiledFunction(lambda a: 1.0 if a else 2.0, 0.0)
