@@ -1,4 +1,4 @@
-"""Write the golden flights that tests/test_flight.py compares with.
+"""Write the golden flights that tests/flight/test_flight.py compares with.
 
 Run it only when a change is meant, and read the difference.
 """

@@ -5,7 +5,7 @@
     python tools/settings_tables.py --write             bring all tables in docs/ up to date
 
 In a page, a table stands between the lines ``<!-- table: NAME -->`` and ``<!-- end of table -->``. Whatever stands
-between them is replaced; tests/test_docs.py compares it with the code.
+between them is replaced; tests/project/test_docs.py compares it with the code.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@ r"""Elementary functions as straight-line vector code, without a branch: sine, c
 
 A library's vector functions take another way for all lanes of a group where one lane is huge or NaN, and round
 differently there; a lost flight would then change the last bits of its neighbours. These here do the same for every
-lane. Errors stay within about one unit in the last place (tests/test_elementary.py).
+lane. Errors stay within about one unit in the last place (tests/engine/test_elementary.py).
 
 - Sine and cosine: x less a multiple n of pi/2, in three steps with pi/2 as a sum of three numbers (Cody and Waite
   1980; each product fused with its difference), then polynomials on [-pi/4, pi/4]. NaN beyond 1e14 rad, where

@@ -16,8 +16,9 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
-from rotorfault.campaigns import charts, grades
+from rotorfault.campaigns import grades
 from rotorfault.campaigns.block import RECOVERED
+from rotorfault.campaigns.report import charts
 from rotorfault.campaigns.report.charts import signed
 from rotorfault.campaigns.report.curves import slices
 from rotorfault.campaigns.report.maps import Maps

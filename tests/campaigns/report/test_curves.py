@@ -1,0 +1,58 @@
+"""Boundaries on maps: where they go, with what intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from campaign_tables import LOSS, TWO_FAULTS, WIND, falling, study_of, table_of
+
+from rotorfault.campaigns.report import curves
+from rotorfault.campaigns.report.maps import Maps, maps
+from rotorfault.campaigns.sampling.refine import Refinement, intervals
+from rotorfault.model.vehicle_file import load_vehicle
+
+
+def test_boundaries_go_where_they_must(plane: Maps) -> None:
+    (part,), count = curves.slices(plane)
+    assert count == 1
+    half = curves.crossings(plane, plane.variants[1], part, 0.5)
+    # Survival 1, 0.5, 0 at losses 0.2, 0.4, 0.6, in every wind.
+    assert (half.along == 0).all()
+    np.testing.assert_allclose(half.points, [[0.4, 0.0], [0.4, 4.0], [0.4, 8.0]])
+    np.testing.assert_allclose(half.lines[0][:, 0], 0.4)
+    high = curves.crossings(plane, plane.variants[1], part, 0.99)
+    np.testing.assert_allclose(high.points[:, 0], 0.2 + 0.2 * 0.02)
+    bounds = intervals([24, 12, 0], 24, Refinement(24, 24, most=24))
+    flown = study_of([LOSS, WIND], refine={"initial": 24, "block": 24, "most": 24})
+    many = maps(flown, table_of(flown, falling, lambda *_: 24))
+    half = curves.crossings(many, many.variants[1], part, 0.5)
+    lower = 0.2 + 0.2 * (bounds.lower[0] - 0.5) / (bounds.lower[0] - bounds.lower[1])
+    np.testing.assert_allclose(half.lower, lower)
+    np.testing.assert_allclose(half.upper, 0.8 - lower)
+
+
+def test_boundaries_are_looked_for_across_them() -> None:
+    study = study_of([LOSS, WIND])
+    found = maps(study, table_of(study, lambda _, place: 1.0 - 0.5 * place[1]))
+    across = curves.crossings(found, found.variants[0], curves.slices(found)[0][0], 0.75)
+    assert (across.along == 1).all()
+    assert len(across.along) == 5
+    np.testing.assert_allclose(across.points[:, 1], 2.0)
+
+
+def test_boundaries_with_a_corner_have_intervals_on_both_sides_of_it() -> None:
+    study = study_of([LOSS, {"name": "second_loss", "values": LOSS["values"]}], settings=TWO_FAULTS)
+    found = maps(study, table_of(study, lambda _, place: float(max(place) < 3)))
+    half = curves.crossings(found, found.variants[0], curves.slices(found)[0][0], 0.5)
+    for axis in (0, 1):
+        np.testing.assert_allclose(
+            half.points[half.along == axis], np.roll([[0.5, 0], [0.5, 0.2], [0.5, 0.4]], axis, 1)
+        )
+
+
+def test_limits_between_cells_are_at_the_critical_loss(plane: Maps) -> None:
+    found = curves.edges(plane, 0, curves.slices(plane)[0][0])
+    vehicle = load_vehicle("paper").vehicle
+    critical = 1.0 - vehicle.mass * vehicle.gravity / (4.0 * vehicle.rotor_gain * vehicle.thrust_max)
+    line = found.with_yaw[0]
+    assert line[np.argmin(line[:, 1]), 0] == pytest.approx(critical, abs=1e-5)

@@ -1,0 +1,44 @@
+"""Figures of a campaign cover nothing and are no more than can be looked at."""
+
+from __future__ import annotations
+
+import pytest
+from campaign_tables import LOSS, STUDIES, WIND, falling, study_of, table_of
+from figure_checks import check_nothing_covered
+from matplotlib.figure import Figure
+
+from rotorfault.campaigns.report import curves, figures
+from rotorfault.campaigns.report.maps import Maps, maps
+
+
+@pytest.fixture(scope="module", params=list(STUDIES))
+def made(request: pytest.FixtureRequest) -> tuple[str, Maps, dict[str, Figure]]:
+    study = STUDIES[request.param]
+    found = maps(study, table_of(study, falling))
+    return request.param, found, figures.draw(found)
+
+
+def test_figures_cover_nothing(made: tuple[str, Maps, dict[str, Figure]]) -> None:
+    name, _, drawn = made
+    wanted = {
+        "plane": {"survival", "difference", "outcomes", "recovery"},
+        "line": {"survival", "difference", "outcomes", "recovery"},
+        "names": {"survival", "outcomes", "recovery"},
+        "space": {"survival-one", "survival-two", "difference-one-two", "outcomes", "recovery"},
+        "odd": {"survival", "difference", "outcomes", "recovery"},
+    }
+    assert set(drawn) == wanted[name]
+    for title, figure in drawn.items():
+        figure.canvas.draw()
+        check_nothing_covered(f"{name} {title}", figure)
+
+
+def test_no_more_slices_than_can_be_looked_at() -> None:
+    study = study_of(
+        [LOSS, WIND, {"name": "mass", "start": 0.8, "stop": 1.2, "count": 9}], variant=[{"label": "one"}]
+    )
+    found = maps(study, table_of(study, falling))
+    parts, count = curves.slices(found)
+    assert (len(parts), count) == (curves.MOST_SLICES, 9)
+    assert (parts[0].title, parts[-1].title) == ("mass 0.8", "mass 1.2")
+    assert "6 of 9" in figures.draw(found)["survival-one"].legends[0].get_title().get_text()

@@ -1,0 +1,248 @@
+"""Campaigns: the same table whatever happens on the way, replays that are the flight, and clear refusals."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from campaign_studies import TINY
+from places import SOURCE
+
+import rotorfault
+from rotorfault.base.errors import InputError
+from rotorfault.campaigns import run
+from rotorfault.campaigns.block import fly_block
+from rotorfault.campaigns.replay import identifier_of, replay
+from rotorfault.campaigns.sampling.plan import Flights, drawn, identified, identifier, next_round, seeds
+from rotorfault.campaigns.studies import study_names
+from rotorfault.campaigns.study import Study, changed, load_study, study_from
+from rotorfault.engine import have_simd
+
+pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+
+
+def tiny(**tables: Any) -> Study:
+    return study_from(TINY | tables, "test")
+
+
+def complete(study: Study, folder: Path, crew: Any = None, resume: bool = False) -> bytes:
+    with run.open_store(study, folder, resume) as store:
+        run.fly(study, store, crew or run.Here())
+    return (folder / "flights.parquet").read_bytes()
+
+
+@pytest.fixture
+def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 10)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The table of the tiny study in blocks of ten."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 10)
+        return complete(tiny(), tmp_path_factory.mktemp("undisturbed") / "campaign")
+
+
+# --------------------------------------------------------------------------------------------------- the same table
+
+
+class Shuffled:
+    """Blocks in any order, on one thread."""
+
+    def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Any:
+        mixed = list(work)
+        random.Random(1).shuffle(mixed)
+        return ((number, fly_block(study, flights, threads=1)) for number, flights in mixed)
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_order_and_threads_do_not_matter(tmp_path: Path, undisturbed: bytes) -> None:
+    assert complete(tiny(), tmp_path / "campaign", Shuffled()) == undisturbed
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_an_interrupted_campaign_goes_on(tmp_path: Path, undisturbed: bytes) -> None:
+    class Tired(run.Here):
+        def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Any:
+            for done, result in enumerate(super().fly(study, work)):
+                if done == 2:
+                    raise KeyboardInterrupt
+                yield result
+
+    with pytest.raises(KeyboardInterrupt):
+        complete(tiny(), tmp_path / "campaign", Tired())
+    assert not (tmp_path / "campaign" / "flights.parquet").exists()
+    assert len(list((tmp_path / "campaign" / "parts").iterdir())) == 2
+    assert complete(tiny(), tmp_path / "campaign", resume=True) == undisturbed
+
+
+def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, undisturbed: bytes) -> None:
+    """Three kills at random moments, without a chance to tidy up."""
+    code = (
+        "import sys, rotorfault.campaigns.sampling.plan as plan\n"
+        "plan.FLIGHTS_IN_BLOCK = 10\n"
+        "from rotorfault.campaigns import run\n"
+        "from rotorfault.campaigns.study import study_from\n"
+        "from pathlib import Path\n"
+        f"study = study_from({TINY!r}, 'test')\n"
+        "folder = Path(sys.argv[1])\n"
+        "with run.open_store(study, folder, folder.exists()) as store:\n"
+        "    print('open', flush=True)\n"
+        "    run.fly(study, store, run.Here())\n"
+        "print('complete', flush=True)\n"
+    )
+    folder, draw = tmp_path / "campaign", random.Random(3)
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
+    for _ in range(3):
+        child = subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=subprocess.PIPE)
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"open\n"
+        time.sleep(draw.uniform(0.0, 0.4))
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(folder)], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.endswith("complete\n"), done.stderr
+    assert (folder / "flights.parquet").read_bytes() == undisturbed
+
+
+# ------------------------------------------------------------------------------------------------- what a flight is
+
+
+def test_flights_are_paired_between_variants() -> None:
+    study = tiny()
+    cells, numbers = np.array([0, 3, 8]), np.array([0, 5, 11])
+    first, second = (Flights(np.full(3, v), cells, numbers) for v in (0, 1))
+    np.testing.assert_array_equal(seeds(study, first), seeds(study, second))
+    for name, values in drawn(study, first).items():
+        np.testing.assert_array_equal(values, drawn(study, second)[name])
+    assert len(set(seeds(study, first).tolist())) == 3
+    assert seeds(changed(study, seed=1), first).tolist() != seeds(study, first).tolist()
+
+
+@pytest.mark.parametrize("design", ["independent", "sobol", "latin"])
+def test_draws_have_their_distribution(design: str) -> None:
+    study = tiny(design=design, refine={"initial": 512, "block": 64, "most": 512, "width": 0.4})
+    flights = Flights(np.zeros(512, dtype=int), np.full(512, 4), np.arange(512))
+    found = drawn(study, flights)
+    assert abs(found["wind_direction"].mean()) < 0.3
+    assert found["wind_direction"].std() == pytest.approx(6.0 / np.sqrt(12.0), rel=0.1)
+    assert found["mass"].mean() == pytest.approx(1.0, abs=0.006)
+    assert found["mass"].std() == pytest.approx(0.03, rel=0.15)
+    assert 0.4 < np.mean(found["rotor"] == 1) < 0.6
+    # A flight's draws are its own, whoever flies beside it.
+    one = flights.part(slice(100, 101))
+    for name, values in drawn(study, one).items():
+        assert values[0] == found[name][100]
+
+
+def test_identifiers_name_flights() -> None:
+    study = tiny()
+    everyone = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int))
+    assert everyone.size == 2 * 9 * 4
+    names = identifier(study, everyone)
+    assert len(np.unique(names)) == everyone.size
+    for k in (0, 17, 71):
+        assert [int(part[0]) for part in identified(study, int(names[k]))] == [int(part[k]) for part in everyone]
+    assert identifier_of(study, "smc", 5, 3) == int(
+        identifier(study, Flights(*(np.array([x]) for x in (1, 5, 3))))[0]
+    )
+
+
+def test_a_replay_is_the_flight_of_the_table() -> None:
+    study = tiny()
+    flights = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int)).part(slice(0, 72, 7))
+    table = fly_block(study, flights)
+    for row in table.to_pylist():
+        flight = replay(study, row["id"])
+        assert flight.outcome.kind == row["outcome"] or row["outcome"] in ("settled", "offset")
+        summary = flight.summary()
+        assert summary["cost"] == pytest.approx(row["cost"], rel=1e-12)
+        assert summary["tilt_max"] == pytest.approx(row["tilt_max"], rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"axis": [{"name": "los", "values": [0.1]}]}, "unknown axis 'los'; did you mean 'loss'"),
+        ({"axis": [{"name": "loss", "start": 0.5, "stop": 0.5, "count": 3}]}, "an empty range"),
+        ({"axis": [{"name": "loss", "values": []}]}, "is empty"),
+        ({"axis": [{"name": "loss", "values": [0.1, 1.5]}]}, "allowed: 0 to 1"),
+        ({"axis": [{"name": "loss"}]}, "give values, or start, stop and count"),
+        ({"axis": [{"name": "loss", "values": [0.1, 0.1]}]}, "has values twice"),
+        ({"draw": [{"name": "loss", "uniform": [0.0, 1.0]}]}, "is varied twice"),
+        ({"draw": [{"name": "mass", "uniform": [1.0, 1.0]}]}, "an empty range"),
+        ({"draw": [{"name": "mass"}]}, "give one of uniform, normal and choice"),
+        ({"variant": []}, "variant"),
+        ({"variant": [{"label": "a"}, {"label": "a"}]}, "two variants are called 'a'"),
+        ({"axis": [{"name": "loss", "start": 0.0, "stop": 1.0, "count": 9999},
+                   {"name": "drag", "start": 0.5, "stop": 1.0, "count": 9999}]}, "cells; allowed: up to 100,000"),
+        ({"refine": {"initial": 24, "most": 10**8}}, "flights; allowed: up to 2e"),
+        ({"refine": {"budget": 10}}, "allowed: at least"),
+        ({"survived": ["flown"]}, "unknown grade 'flown'"),
+        ({"nothing": 1}, "unknown key"),
+    ],
+)  # fmt: skip
+def test_bad_studies_are_refused(tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        tiny(**tables)
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"scenario": "hover-falt"}, "variant 'roismc': unknown scenario 'hover-falt'"),
+        ({"settings": {"no.such": 1.0}}, "unknown key"),
+        (
+            {"variant": [{"label": "x", "settings": {"controller.kind": "rismc"}}]},
+            "variant 'x': .*unknown controller",
+        ),
+        ({"axis": [{"name": "detection_delay", "values": [0.1]}]}, "unknown key"),
+        ({"axis": [{"name": "allocator", "values": ["effectiveness", "best"]}]}, "unknown allocator 'best'"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_before_anything_flies(tables: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        run.check(tiny(**tables))
+
+
+@pytest.mark.parametrize("name", study_names())
+@pytest.mark.parametrize("vehicle", [None, "crazyflie-2.1", "hummingbird"])
+def test_built_in_studies_can_be_flown(name: str, vehicle: str | None) -> None:
+    study = changed(load_study(name), vehicle, None if vehicle is None else "gentle")
+    run.check(study)
+    flights = Flights(np.array([0, 1]), np.array([1, 1]), np.array([0, 0]))
+    short = study_from(study.as_tables() | {"settings": {**study.settings, "duration": 1.2}}, "test")
+    table = fly_block(short, flights)
+    assert table.num_rows == 2
+    assert set(table["variant"].to_pylist()) == {"roismc", "smc"}
+
+
+def test_from_python(tmp_path: Path) -> None:
+    told: list[str] = []
+    found = rotorfault.campaign(TINY, tmp_path / "campaign", seed=3, say=told.append)
+    assert told
+    assert "tiny" in repr(found)
+    table = found.table()
+    row = table.to_pylist()[7]
+    assert found.replay(row["id"]).summary()["cost"] == pytest.approx(row["cost"], rel=1e-12)
+    again = rotorfault.Campaign(tmp_path / "campaign")
+    pd.testing.assert_frame_equal(again.table().to_pandas(), table.to_pandas())
+    assert again.study.seed == 3
+    assert int(again.maps().flights) == table.num_rows
+    with pytest.raises(InputError, match="allowed: a name, a path, tables or a Study"):
+        rotorfault.campaign(3)  # type: ignore[arg-type]

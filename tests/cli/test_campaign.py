@@ -1,0 +1,130 @@
+"""Campaigns from the command line: what is written, resumed, replayed, and refused in one line with exit code 2."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from places import SOURCE
+
+from rotorfault.engine import have_simd
+
+pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+STUDY = """
+name = "tiny"
+scenario = "hover-fault"
+settings = { duration = 1.0, period = 0.004, step = 0.004, "fault.0.time" = 0.2, "diagnosis.poles" = [60.0, 80.0] }
+
+[[axis]]
+name = "loss"
+values = [0.1, 0.9]
+
+[[axis]]
+name = "wind_speed"
+values = [0.0, 8.0]
+
+[[draw]]
+name = "mass"
+uniform = [0.95, 1.05]
+
+[[variant]]
+label = "roismc"
+settings = { "controller.kind" = "roismc" }
+
+[[variant]]
+label = "smc"
+settings = { "controller.kind" = "smc" }
+
+[refine]
+initial = 4
+block = 4
+most = 8
+width = 0.5
+"""
+
+
+def call(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "rotorfault.cli.main", *arguments],
+        cwd=folder, env={**os.environ, "PYTHONPATH": str(SOURCE.parent)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    here = tmp_path_factory.mktemp("campaigns")
+    (here / "tiny.toml").write_text(STUDY)
+    done = call(here, "campaign", "tiny.toml")
+    assert done.returncode == 0, done.stderr
+    assert "survived over the map" in done.stderr
+    return here
+
+
+def test_it_writes_a_table_with_one_row_per_flight(folder: Path) -> None:
+    table = pq.read_table(folder / "campaigns" / "tiny" / "flights.parquet")
+    assert table.num_rows >= 2 * 4 * 4
+    assert set(table["variant"].to_pylist()) == {"roismc", "smc"}
+    assert len(set(table["id"].to_pylist())) == table.num_rows
+    assert json.loads((folder / "campaigns" / "tiny" / "study.json").read_text())["study"]["name"] == "tiny"
+
+
+def test_a_complete_campaign_is_refused_anew_and_resumed_at_once(folder: Path) -> None:
+    before = (folder / "campaigns" / "tiny" / "flights.parquet").read_bytes()
+    again = call(folder, "campaign", "tiny.toml")
+    assert again.returncode == 2
+    assert "--resume" in again.stderr
+    resumed = call(folder, "campaign", "tiny.toml", "--resume")
+    assert resumed.returncode == 0, resumed.stderr
+    assert (folder / "campaigns" / "tiny" / "flights.parquet").read_bytes() == before
+
+
+def test_a_replay_writes_the_whole_flight(folder: Path) -> None:
+    row: dict[str, Any] = pq.read_table(folder / "campaigns" / "tiny" / "flights.parquet").to_pylist()[5]
+    done = call(folder, "replay", "campaigns/tiny", "--flight", str(row["id"]), "--no-figures", "--out", "again")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((folder / "again" / "summary.json").read_text())
+    assert summary["cost"] == pytest.approx(row["cost"], rel=1e-12)
+    assert summary["seed"] == row["seed"]
+    by_cell = call(
+        folder, "replay", "campaigns/tiny", "--cell", str(row["cell"]), "--variant", row["variant"],
+        "--number", str(row["number"]), "--no-figures", "--out", "again",
+    )  # fmt: skip
+    assert by_cell.returncode == 0, by_cell.stderr
+    assert json.loads((folder / "again" / "summary.json").read_text())["cost"] == summary["cost"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["campaign"], "no study was given"),
+        (["campaign", "partial-los-map"], "did you mean 'partial-loss-map'"),
+        (["campaign", "none.toml"], "no such file"),
+        (["campaign", "tiny.toml", "--out", "tiny.toml"], "is a file"),
+        (["campaign", "tiny.toml", "--out", "."], "holds files that are not of a campaign"),
+        (["campaign", "tiny.toml", "--budget", "3"], "allowed: at least"),
+        (["campaign", "tiny.toml", "--vehicle", "papr", "--out", "new"], "did you mean 'paper'"),
+        (["campaign", "tiny.toml", "--preset", "tund", "--out", "new"], "did you mean 'tuned'"),
+        (["campaign", "tiny.toml", "--resume", "--out", "nowhere"], "no such folder"),
+        (["campaign", "tiny.toml", "--scheduler", "tcp://127.0.0.1:1", "--out", "new"], "cannot be reached"),
+        (["campaign", "tiny.toml", "--seed", "5", "--resume"], "seed"),
+        (["replay", "nowhere", "--flight", "1"], "no such folder"),
+        (["replay", "campaigns/tiny"], "give the flight by --flight ID, or by --cell and --variant"),
+        (["replay", "campaigns/tiny", "--flight", "99999999"], "there is no flight 99999999"),
+        (["replay", "campaigns/tiny", "--cell", "1"], "--cell needs --variant"),
+        (["replay", "campaigns/tiny", "--cell", "1", "--variant", "smx"], "there is no variant 'smx'"),
+        (["replay", "campaigns/tiny", "--cell", "77", "--variant", "smc"], "there is no cell 77"),
+    ],
+)
+def test_bad_input_is_one_clear_line(folder: Path, arguments: list[str], message: str) -> None:
+    done = call(folder, *arguments)
+    assert done.returncode == 2, done.stdout
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (folder / "new").exists()

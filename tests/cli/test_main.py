@@ -1,0 +1,272 @@
+"""The command line as users meet it: help, good runs, bad input, Ctrl-C."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import rotorfault as rf
+from rotorfault.cli import main as cli
+
+
+def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "rotorfault.cli.main", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=300)
+
+
+@pytest.mark.parametrize("command", [(), ("fly",), ("compare",), ("list",), ("new",), ("check",), ("trim",)])
+def test_help_teaches(command: tuple[str, ...]) -> None:
+    done = run(*command, "--help")
+    assert done.returncode == 0
+    assert "Usage:" in done.stdout
+    assert len(done.stdout.splitlines()) > 6
+
+
+def test_help_loads_nothing_heavy() -> None:
+    script = "import sys, rotorfault.cli.main; print([m for m in sys.modules if m in {names}])"
+    heavy = {"numpy", "scipy", "xarray", "matplotlib", "heyoka", "pydantic"}
+    done = subprocess.run(
+        [sys.executable, "-c", script.format(names=heavy)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+def test_fly_compare_repeat(tmp_path: Path) -> None:
+    short = ("--set", "duration=0.3", "--no-figures")
+    for name in ("smc", "roismc"):
+        done = run("fly", "paper-set-point", "--controller", name, *short, "--out", str(tmp_path / name))
+        assert done.returncode == 0, done.stderr
+        assert f"flown by {name}" in done.stdout
+        summary = json.loads((tmp_path / name / "summary.json").read_text())
+        assert summary["controller"] == name
+    files = [str(tmp_path / name / "flight.nc") for name in ("smc", "roismc")]
+    done = run("compare", *files, "--no-figures")
+    assert done.returncode == 0, done.stderr
+    assert "smc" in done.stdout
+    assert "roismc" in done.stdout
+    assert "cost J" in done.stdout
+    done = run("fly", "--repeat", files[1], "--no-figures", "--out", str(tmp_path / "again"))
+    assert done.returncode == 0, done.stderr
+    first, again = (json.loads((tmp_path / n / "summary.json").read_text()) for n in ("roismc", "again"))
+    assert first == again
+
+
+def test_figures_are_written(tmp_path: Path) -> None:
+    done = run("fly", "paper-set-point", "--set", "duration=0.3", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in tmp_path.iterdir()}
+    expected = {"position.png", "attitude.png", "rotor_speeds.png", "path.png", "fault_detection.png"}
+    assert expected | {"flight.nc", "summary.json"} <= names
+
+
+@pytest.mark.parametrize("what", ["vehicle", "scenario"])
+def test_new_file_works_as_it_stands(what: str, tmp_path: Path) -> None:
+    done = run("new", what, "mine", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    done = run("check", str(tmp_path / "mine.toml"))
+    assert done.returncode == 0, done.stderr
+    assert "ok" in done.stdout
+    again = run("new", what, "mine", "--out", str(tmp_path))
+    assert again.returncode == 2
+    assert "--force" in again.stderr
+
+
+def test_new_scenario_flies_well(tmp_path: Path) -> None:
+    run("new", "scenario", "mine", "--out", str(tmp_path))
+    flight = rf.fly(tmp_path / "mine.toml")
+    assert flight.outcome.kind == "tracked"
+    assert [hit["rotor"] for hit in flight.summary()["detections"]] == [2]
+
+
+def test_list_names_everything_registered() -> None:
+    done = run("list")
+    assert done.returncode == 0
+    for name in (
+        "roismc",
+        "smc",
+        "ismc",
+        "sdre",
+        "paper_model",
+        "luenberger",
+        "effectiveness",
+        "crazyflie-2.1",
+        "ramp",
+    ):
+        assert f"  {name} " in done.stdout
+
+
+def test_trim_prints_margins() -> None:
+    done = run("trim", "paper")
+    assert done.returncode == 0, done.stderr
+    for word in ("hover", "linearisation", "poles", "gain up", "gain down", "delay [ms]"):
+        assert word in done.stdout.lower()
+
+
+def test_trim_says_what_losses_leave_of_hover() -> None:
+    done = run("trim", "hummingbird", "--loss", "2=0.9", "--loss", "3=0.1")
+    assert done.returncode == 0, done.stderr
+    for line in (
+        "rotor 2 lost 0.9, rotor 3 lost 0.1",
+        "yaw held      no",
+        "yaw given up  yes",
+        "yaw torque left over",
+    ):
+        assert line in done.stdout
+
+
+@pytest.mark.parametrize("losses", [("1",), ("5=0.1",), ("1=1.5",), ("x=0.1",), ("1=nan",), ("1=0.1", "1=0.2")])
+def test_trim_refuses_losses_that_are_none(losses: tuple[str, ...]) -> None:
+    done = run("trim", "paper", *(word for pair in losses for word in ("--loss", pair)))
+    assert done.returncode == 2
+    assert f"--loss {losses[-1]}" in done.stderr
+    assert "allowed" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not done.stdout
+
+
+# Arguments of `fly`, and what the one line of the error must name.
+BAD = [
+    (("nowhere",), ["nowhere", "paper-set-point"]),
+    (("paper-set-pont",), ["did you mean 'paper-set-point'"]),
+    (("paper-set-point", "--controller", "roismk"), ["controller", "did you mean 'roismc'"]),
+    (("paper-set-point", "--preset", "nice"), ["preset", "nice", "tuned"]),
+    (("paper-set-point", "--engine", "gpu"), ["engine", "gpu", "python"]),
+    (("paper-set-point", "--set", "windd.kind=none"), ["windd", "did you mean 'wind'"]),
+    (("paper-set-point", "--set", "fault.0.rotor=5"), ["fault.0", "rotor", "5"]),
+    (("paper-set-point", "--set", "fault.7.loss=0.1"), ["fault.7.loss", "0 to 1"]),
+    (("paper-set-point", "--set", "fault.0.loss=1.5"), ["loss", "1.5"]),
+    (("paper-set-point", "--set", "duration=nan"), ["duration"]),
+    (("paper-set-point", "--set", "duration=-1"), ["duration", "-1"]),
+    (("paper-set-point", "--set", "duration=true"), ["duration", "a number"]),
+    (("paper-set-point", "--set", 'wind.kind=["a"]'), ["wind.kind", "constant"]),
+    (("paper-set-point", "--set", 'controller.preset=["a"]'), ["controller.preset"]),
+    (("paper-set-point", "--set", "vehicle=5"), [" vehicle: got 5"]),
+    (("paper-set-point", "--set", "step=1e-12"), ["step", "1e-06"]),
+    (("paper-set-point", "--set", "duration=3600", "--set", "period=1e-4"), ["record_period"]),
+    (("paper-set-point", "--seed", "99999999999999999999"), ["seed"]),
+    (("paper-set-point", "--set", "step=0.01"), ["step", "0.01", "sampling period"]),
+    (("paper-set-point", "--set", "step=0.0007"), ["step", "0.0007"]),
+    (("paper-set-point", "--set", "start.position=[0,nan,0]"), ["start.position"]),
+    (("paper-set-point", "--set", "wind.velocity_W=[1,2]"), ["velocity_W"]),
+    (("paper-set-point", "--set", "noequals"), ["key=value"]),
+    (("paper-set-point", "--set", "diagnosis.poles=[0,100]"), ["poles"]),
+    (("missing.toml",), ["missing.toml", "no such file"]),
+    ((), ["scenario"]),
+    (("--repeat", "missing.nc"), ["missing.nc", "no such file"]),
+    (("--repeat", "missing.nc", "--controller", "smc"), ["--repeat"]),
+    (("paper-set-point", "--controller", "mine.py:Law"), ["mine.py", "no such file"]),
+]
+
+
+@pytest.mark.parametrize(("arguments", "named"), BAD, ids=lambda value: " ".join(map(str, value))[:60])
+def test_bad_input_is_one_clear_line(arguments: tuple[str, ...], named: list[str], tmp_path: Path) -> None:
+    done = run("fly", *arguments, "--no-figures", "--out", str(tmp_path / "out"), cwd=tmp_path)
+    assert_refused(done, named)
+    assert not list((tmp_path / "out").glob("*"))
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], named: list[str]) -> None:
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    for word in named:
+        assert word in done.stderr
+
+
+def edited(tmp_path: Path, what: str, old: str, new: str) -> str:
+    run("new", what, "mine", "--out", str(tmp_path))
+    path = tmp_path / "mine.toml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("what", "old", "new", "named"),
+    [
+        ("scenario", "rotor = 2", "rotor = 5", ["mine.toml", "fault.0", "rotor"]),
+        ("scenario", "duration = 12.0", "duration = nan", ["mine.toml", "duration"]),
+        ("scenario", "duration = 12.0", "duratoin = 12.0", ["mine.toml", "duratoin", "duration"]),
+        ("scenario", "step = 0.001", "step = 0.01", ["mine.toml", "step", "sampling period"]),
+        ("scenario", 'vehicle = "hummingbird"', 'vehicle = "nothing.toml"', ["nothing.toml", "no such file"]),
+        ("scenario", "[start]", "[start", ["mine.toml", "not valid TOML", "line"]),
+        ("vehicle", 'unit = "kg"', 'unit = "g"', ["mine.toml", "mass", "unit", "'kg'"]),
+        ("vehicle", "mass = { value = ", "mass = { value = -", ["mine.toml", "mass", "greater than 0"]),
+        ("vehicle", "[[rotor]]", "[[motor]]", ["mine.toml", "motor"]),
+    ],
+)
+def test_bad_file_is_one_clear_line(what: str, old: str, new: str, named: list[str], tmp_path: Path) -> None:
+    assert_refused(run("check", edited(tmp_path, what, old, new)), named)
+
+
+def test_a_controller_s_file_shadows_no_module(tmp_path: Path) -> None:
+    path = tmp_path / "json.py"
+    path.write_text("class Mine:\n    pass\n")
+    mine = cli._own_controller(f"{path}:Mine")
+    assert sys.modules["json"] is json
+    assert vars(sys.modules[type(mine).__module__])["Mine"] is type(mine)
+
+
+def test_truncated_files_are_refused(tmp_path: Path) -> None:
+    path = rf.fly("paper-set-point", settings={"duration": 0.01}).save(tmp_path / "flight.nc")
+    whole = path.read_bytes()
+    for size in (0, 100, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        assert_refused(run("check", str(path)), ["flight.nc"])
+    toml = edited(tmp_path, "vehicle", "name", "name")
+    Path(toml).write_text(Path(toml).read_text()[:300])
+    assert_refused(run("check", toml), ["mine.toml"])
+
+
+def test_folder_that_cannot_be_written_is_told_before_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    done = run("fly", "paper-set-point", "--out", str(tmp_path / "file" / "deep"))
+    assert_refused(done, ["file", "--out"])
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_folder_without_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    assert_refused(run("fly", "paper-set-point", "--out", str(tmp_path / "out")), ["--out"])
+
+
+def test_interrupt_leaves_whole_files_or_none(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [
+        sys.executable,
+        "-m",
+        "rotorfault.cli.main",
+        "fly",
+        "paper-set-point",
+        "--engine",
+        "python",
+        "--no-figures",
+    ]
+    command += ["--set", "duration=600", "--out", str(out)]
+    # A shell that runs the tests in the background lets its children ignore the signal; undone for this child.
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    while process.poll() is None and not out.exists():
+        time.sleep(0.05)
+    time.sleep(3.0)  # now it flies; whenever the signal hits, the rules below hold
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert "Traceback" not in errors
+    assert not [path for path in out.iterdir() if path.name.startswith(".")]
+    for path in out.glob("*.nc"):
+        flight = rf.load(path)
+        assert flight.outcome.kind == "interrupted"
+        assert flight.outcome.time < 600.0
+        assert json.loads((out / "summary.json").read_text())["outcome"] == "interrupted"

@@ -1,0 +1,12 @@
+"""A compiled flight that several tests of the engines compare with."""
+
+from __future__ import annotations
+
+import pytest
+from engine_flights import Array, case_one, run
+
+
+@pytest.fixture(scope="session")
+def simd_case_one() -> Array:
+    pytest.importorskip("heyoka")
+    return run(case_one(duration=4.0), "simd").signals

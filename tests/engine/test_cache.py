@@ -1,0 +1,176 @@
+"""The cache of compiled loops: compiled once, never served to another loop, damaged files replaced."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from engine_flights import run, short
+from places import SOURCE
+
+import rotorfault
+from rotorfault.engine import cache
+from rotorfault.engine.structure import structure
+from rotorfault.flight.assembly import assemble
+
+
+class Compiler:
+    """Counts compilations."""
+
+    def __init__(self, module: Any) -> None:
+        self.count, self._right = 0, module.compile_text
+
+    def __call__(self, text: str) -> bytes:
+        self.count += 1
+        code: bytes = self._right(text)
+        return code
+
+
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Compiler:
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine import native
+
+    found = Compiler(native)
+    monkeypatch.setattr(native, "compile_text", found)
+    forget(monkeypatch)
+    monkeypatch.setenv("ROTORFAULT_CACHE", str(tmp_path / "cache"))
+    return found
+
+
+def forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a process that has just been started."""
+    from rotorfault.engine import machine
+
+    monkeypatch.setattr(cache, "_KEPT", {})
+    monkeypatch.setattr(machine, "_LOADED", {})
+
+
+def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wanted = run(short(), "simd").signals
+    run(short(seed=3, controller={"kind": "smc", "preset": "none", "cascade": {"tilt_max": 0.5}}), "simd")
+    assert compiler.count == 1, "numbers are no structure"
+    forget(monkeypatch)
+    np.testing.assert_array_equal(run(short(), "simd").signals, wanted)
+    assert compiler.count == 1
+    files = sorted((tmp_path / "cache").iterdir())
+    assert [file.suffix for file in files] == [".loop"]
+
+    # Really another process: its compiler must not be asked.
+    code = (
+        "from rotorfault.engine import load_engine, native\n"
+        "from rotorfault.flight.assembly import assemble\n"
+        "from rotorfault.engine.batch import no_watch\n"
+        "from rotorfault.scenario.scenario import scenario_from\n"
+        "def refuse(text): raise SystemExit('compiled again')\n"
+        "native.compile_text = refuse\n"
+        f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
+        "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
+    )
+    root = str(SOURCE.parent)
+    environment = {**os.environ, "PYTHONPATH": root}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert float.fromhex(done.stdout) == wanted[-1, 0, 0]
+
+
+def test_a_damaged_file_is_replaced(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wanted = run(short(), "simd").signals
+    (file,) = (tmp_path / "cache").iterdir()
+    right = file.read_bytes()
+    middle = len(right) // 2
+    damaged = {
+        "empty": b"",
+        "truncated": right[:middle],
+        "no code": b"not at all",
+        "something else": hashlib.sha256(b"{}\n").digest() + b"{}\n",
+        # This one could be loaded, and would fly with damaged code.
+        "one byte changed": right[:middle] + bytes([right[middle] ^ 1]) + right[middle + 1 :],
+    }
+    for count, (what, content) in enumerate(damaged.items(), start=2):
+        file.write_bytes(content)
+        forget(monkeypatch)
+        np.testing.assert_array_equal(run(short(), "simd").signals, wanted)
+        assert compiler.count == count, what
+        forget(monkeypatch)
+        run(short(), "simd")
+        assert compiler.count == count, f"{what}: was not replaced"
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    for folder in (str(tmp_path / "file" / "below"), ""):
+        monkeypatch.setenv("ROTORFAULT_CACHE", folder)
+        forget(monkeypatch)
+        assert np.isfinite(run(short(), "simd").signals).all()
+    assert compiler.count == 2
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_key_tells_structures_apart() -> None:
+    def digest(**tables: Any) -> str | None:
+        return cache.key(assemble(short(**tables)).loop, "1", "quiet")
+
+    base = digest()
+    assert digest() == base
+    assert digest(seed=9, fault=[{"kind": "step", "rotor": 2, "time": 0.2, "loss": 0.3}]) == base
+    others = [
+        digest(fault=[{"kind": "step", "rotor": 3, "time": 0.1, "loss": 0.2}]),
+        digest(fault=[]),
+        digest(controller={"kind": "smc", "preset": "none", "law": {"switching": "discontinuous"}}),
+        digest(controller={"kind": "smc", "preset": "none", "cascade": {"six_inputs": True}}),
+        digest(diagnosis={"kind": "delayed", "delay": 0.1}),
+        digest(diagnosis={"kind": "delayed", "delay": 0.2}),
+        digest(plant="paper_model"),
+        digest(step=0.001),
+        digest(sensors="ideal"),
+        cache.key(assemble(short()).loop, "2", "quiet"),
+        cache.key(assemble(short()).loop, "1", "recording"),
+    ]
+    assert len({base, *others}) == 1 + len(others)
+
+
+class ArrayGains:
+    """A block from outside the package whose numbers lie in an array that it keeps to itself."""
+
+    def __init__(self, gains: Any) -> None:
+        self.gains = np.asarray(gains)
+
+    def parameters(self, vehicle: Any, period: float) -> tuple[()]:
+        return ()
+
+    def initial(self, measurement: Any, reference: Any, parameters: Any) -> tuple[()]:
+        return ()
+
+    def step(self, memory: Any, inputs: Any, parameters: Any, dt: Any) -> Any:
+        climb = (inputs.reference.p_W.z - inputs.measurement.p_W.z) * self.gains[0].item()
+        nothing = rotorfault.Vec3(0.0, 0.0, 0.0)
+        wrench = rotorfault.Wrench(inputs.vehicle.mass * (inputs.vehicle.gravity + climb), nothing)
+        return memory, rotorfault.ControlOutput(wrench, nothing, rotorfault.no_telemetry())
+
+
+def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another one's code must not serve, neither in the process nor from the disk."""
+    for gains in ([1.0], [3.0], [1.0]):
+        block = ArrayGains(gains)
+        found = rotorfault.fly(short(), controller=block, engine="simd")
+        wanted = rotorfault.fly(short(), controller=block, engine="python")
+        assert np.abs(found.data["position"] - wanted.data["position"]).max() < 1e-9
+    assert compiler.count == 2
+    forget(monkeypatch)
+    rotorfault.fly(short(), controller=ArrayGains([3.0]), engine="simd")
+    assert compiler.count == 2, "the same numbers were compiled before"
+
+
+def test_structure_is_one_word_per_part() -> None:
+    words = structure(assemble(short()).loop)
+    assert all(isinstance(word, str) for word in words)
+    assert "RigidBody" in words[0]

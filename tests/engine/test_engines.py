@@ -1,0 +1,98 @@
+"""The engines: the same numbers on all, and which one is chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from engine_flights import Array, assert_same, case_one, every_engine, run, short
+
+import rotorfault
+from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings, limited_force
+from rotorfault.autopilot.control.sdre import Sdre, Weights
+from rotorfault.base.errors import InputError
+from rotorfault.engine import default_engine, have_simd, load_engine
+from rotorfault.engine.batch import CHUNK
+from rotorfault.flight.assembly import assemble_all
+from rotorfault.maths.geometry import Vec3
+from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.scenario.neighbours import neighbour
+
+
+def test_python_agrees_with_simd(simd_case_one: Array) -> None:
+    """4 s of case 1 with both faults at 1.8 s."""
+    found = run(case_one(duration=4.0), "python").signals
+    assert found[-1, SIGNAL_NAMES.index("fault_flag.r1"), 0] == 1.0
+    assert found[-1, SIGNAL_NAMES.index("fault_flag.r3"), 0] == 1.0
+    assert_same(found, simd_case_one)
+
+
+def test_numpy_agrees_with_simd() -> None:
+    """The first 3 s of case 1, and of a neighbour whose faults come at 1 s, at 2 ms."""
+    pytest.importorskip("llvmlite")
+    base = case_one(duration=3.0, period=0.002, step=0.002)
+    batch = assemble_all([base, neighbour(base, 3, onset=(1.0, 1.0))])
+    found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
+    assert found.shape == (1500, len(SIGNAL_NAMES), 2)
+    assert (found[-1, SIGNAL_NAMES.index("fault_flag.r1")] == 1.0).all()
+    assert_same(found, wanted)
+
+
+def test_force_limit_stays_real_on_compiled_code() -> None:
+    """Fused operations round a^2 - b^2 once: where a = b that could fall below zero under the root."""
+    pytest.importorskip("llvmlite")
+    from rotorfault.engine.function import CompiledFunction
+
+    vehicle = load_vehicle("paper").vehicle
+    cascade = Cascade(Sdre(Weights()), CascadeSettings())
+    numbers = cascade.parameters(vehicle, 1e-3)
+
+    def limited(force: Vec3, share: Any) -> Vec3:
+        return limited_force(force, 4.0 * vehicle.thrust_max, vehicle, numbers._replace(thrust_share=share))
+
+    shares = np.linspace(0.5, 1.0, 4096)
+    rows = np.array([np.full(4096, 9.0), np.full(4096, -4.0), np.full(4096, 1e3), shares])
+    found = CompiledFunction(limited, Vec3(0.0, 0.0, 0.0), 0.0)(rows)
+    assert np.isfinite(found).all()
+    assert np.abs(found[:2]).max() < 1e-6
+    np.testing.assert_allclose(found[2], shares * 4.0 * vehicle.thrust_max / vehicle.mass, rtol=1e-14)
+
+
+@every_engine
+def test_late_measurements_fly_the_same_on_all_engines(engine: str) -> None:
+    late = short(sensors={"kind": "noisy", "delay": 3})
+    assert_same(run(late, engine).signals, run(late, "python").signals)
+
+
+def test_noise_crosses_chunks_the_same_on_all_engines() -> None:
+    """More steps than are drawn at a time."""
+    pytest.importorskip("heyoka")
+    long = short(duration=0.005 * (CHUNK + 40))
+    assert_same(run(long, "python").signals, run(long, "simd").signals)
+
+
+def test_engines_are_found_by_name() -> None:
+    with pytest.raises(InputError, match=r"unknown engine 'nunpy'; did you mean 'numpy'\?"):
+        load_engine("nunpy")
+    assert default_engine(1) == ("simd" if have_simd() else "python")
+    assert default_engine(1000) == ("simd" if have_simd() else "numpy")
+
+
+def test_without_llvmlite_the_other_engines_serve(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert (default_engine(1), default_engine(16)) == ("python", "numpy")
+    with pytest.raises(InputError, match="llvmlite, not installed; use --engine numpy or --engine python"):
+        load_engine("simd")
+
+
+@pytest.mark.parametrize("period", [0.003, 0.01])
+def test_many_integration_steps_in_a_period_agree_too(period: float) -> None:
+    """The engine then compiles the sampling instant and the integration step apart."""
+    pytest.importorskip("heyoka")
+    settings = {"duration": 2.4, "period": period, "diagnosis.poles": [60.0, 80.0]}
+    python = rotorfault.fly("paper-set-point", settings=settings, engine="python")
+    simd = rotorfault.fly("paper-set-point", settings=settings, engine="simd")
+    assert np.abs(python.data["position"] - simd.data["position"]).max() < 1e-9
+    assert np.abs(python.data["thrust"] - simd.data["thrust"]).max() < 1e-8

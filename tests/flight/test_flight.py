@@ -1,0 +1,224 @@
+"""Flights from Python: what a `Flight` gives, saving and loading, repeating, comparing with golden numbers."""
+
+import errno
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from places import GOLDEN
+
+import rotorfault as rf
+from rotorfault.model.telemetry import quantities
+
+SHORT = {"duration": 0.5}
+REQUIRED = {
+    "outcome", "survived", "end_time", "settle_time", "position_mse", "attitude_mse", "attitude_demand_mse", "cost",
+    "tilt_max", "control_total_variation", "saturated_fraction", "detections", "false_alarms",
+    "largest_riccati_residual", "scenario", "controller", "seed", "version",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def short() -> rf.Flight:
+    return rf.fly("paper-set-point", settings=SHORT)
+
+
+def test_every_signal_has_unit_and_meaning(short: rf.Flight) -> None:
+    assert set(short.data.data_vars) == set(quantities())
+    for name, variable in short.data.data_vars.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+        assert variable.sizes["time"] == 500
+        assert np.isfinite(variable.values).all(), name
+
+
+def test_summary_has_what_is_promised_and_is_json(short: rf.Flight) -> None:
+    summary = short.summary()
+    assert set(summary) >= REQUIRED
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+    assert set(summary["settle_time"]) == {"x", "y", "z", "overall"}
+    assert "paper-set-point flown by roismc" in str(summary)
+
+
+def test_saved_flight_loads_and_repeats_to_the_last_bit(short: rf.Flight, tmp_path: Path) -> None:
+    path = short.save(tmp_path / "flight.nc")
+    loaded = rf.load(path)
+    assert loaded.data.equals(short.data)
+    assert loaded.outcome == short.outcome
+    assert loaded.summary() == short.summary()
+    again = rf.repeat(path)
+    for name in short.data.data_vars:
+        assert np.array_equal(again.data[name], short.data[name]), name
+
+
+def test_configuration_and_versions_travel_with_the_flight(short: rf.Flight) -> None:
+    tables = json.loads(short.data.attrs["configuration"])
+    assert tables["vehicle"]["mass"]["value"] == 1.77
+    assert tables["controller"]["kind"] == "roismc"
+    assert json.loads(short.data.attrs["versions"])["rotorfault"] == rf.__version__
+
+
+def test_csv_has_a_column_per_component(short: rf.Flight, tmp_path: Path) -> None:
+    path = short.to_csv(tmp_path / "flight.csv")
+    header = path.read_text().splitlines()[0].split(",")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert table.shape == (500, len(header))
+    assert {"time", "position_x", "attitude_yaw", "thrust_4", "gain_angle_roll_pitch"} <= set(header)
+    assert table[:, header.index("position_z")] == pytest.approx(
+        short.data["position"].sel(axis="z").values, rel=1e-8
+    )
+
+
+def test_write_leaves_nothing_else_in_the_folder(short: rf.Flight, tmp_path: Path) -> None:
+    written = short.write(tmp_path / "deep" / "folder", with_figures=False)
+    assert sorted(p.name for p in (tmp_path / "deep" / "folder").iterdir()) == ["flight.nc", "summary.json"]
+    assert json.loads(written[1].read_text())["seed"] == 0
+
+
+def climbing(time: float) -> tuple[float, float, float, float]:
+    return 0.0, 0.0, 1.0 + 0.1 * time, 0.0
+
+
+def test_a_python_function_is_a_reference(tmp_path: Path) -> None:
+    settings = {"duration": 0.1, "reference": {"kind": "function", "function": climbing}}
+    flight = rf.fly("paper-set-point", settings=settings)
+    assert flight.data["position_reference"].values[-1, 2] == pytest.approx(1.0099)
+    path = flight.save(tmp_path / "flight.nc")
+    stored = json.loads(rf.load(path).data.attrs["configuration"])["reference"]["function"]
+    assert stored.endswith(":climbing")
+
+
+@pytest.mark.parametrize("given", [5, None, ["paper-set-point"]])
+def test_what_is_no_scenario_is_refused(given: object) -> None:
+    with pytest.raises(rf.InputError, match="allowed: a name, a path"):
+        rf.fly(given)
+
+
+def test_a_reference_that_is_not_finite_is_refused() -> None:
+    huge = {"kind": "sinusoid", "amplitude": [1.0, 1.0, 1.0], "frequency": [1e300, 1.0, 1.0]}
+    with pytest.raises(rf.InputError, match=r"reference: .* is not finite"):
+        rf.fly("paper-set-point", settings={**SHORT, "reference": huge})
+
+
+def test_noise_depends_on_the_seed_and_on_nothing_else() -> None:
+    noisy = {**SHORT, "sensors.kind": "noisy"}
+    one, same = (rf.fly("paper-set-point", settings=noisy, seed=7) for _ in range(2))
+    other = rf.fly("paper-set-point", settings=noisy, seed=8)
+    assert np.array_equal(one.data["position"], same.data["position"])
+    assert not np.array_equal(one.data["position"], other.data["position"])
+
+
+def test_a_tumbling_flight_ends_with_an_outcome_and_finite_numbers() -> None:
+    dead = [{"kind": "total", "rotor": 1, "time": 0.2}, {"kind": "total", "rotor": 2, "time": 0.2}]
+    flight = rf.fly("paper-set-point", settings={"fault": dead, "duration": 5.0})
+    assert not flight.outcome.survived
+    assert flight.outcome.kind in ("tumbled", "diverged")
+    assert 0.2 < flight.outcome.time < 5.0
+    assert np.isfinite(flight.data["position"].values).all()
+    assert flight.summary()["settle_time"]["overall"] is None
+
+
+def test_ground_ends_a_flight() -> None:
+    falling = [{"kind": "step", "rotor": r, "time": 0.0, "loss": 0.9} for r in (1, 2, 3, 4)]
+    flight = rf.fly("paper-set-point", settings={"fault": falling, "ground": 0.0, "duration": 5.0,
+                                                 "start.attitude": [0.0, 0.0, 0.0]})  # fmt: skip
+    assert flight.outcome.kind == "ground"
+
+
+@pytest.mark.parametrize("name", ["nominal", "faulty"])
+def test_golden_flight(name: str) -> None:
+    """One flight without and one with faults, against tables that are read by people when they change."""
+    settings = {"duration": 3.0, "record_period": 0.1}
+    if name == "nominal":
+        settings["fault"] = []
+    flight = rf.fly("paper-set-point", settings=settings)
+    table = np.loadtxt(GOLDEN / f"{name}.csv", delimiter=",", skiprows=1)
+    got = np.column_stack([flight.data["time"], flight.data["position"], flight.data["attitude"]])
+    assert got == pytest.approx(table, abs=2e-6)
+
+
+def test_flights_in_a_batch_equal_flights_alone() -> None:
+    base = rf.load_scenario("paper-set-point", SHORT)
+    scenarios = [rf.neighbour(base, seed=i) for i in range(3)]
+    together = rf.fly_all(scenarios, engine="python")
+    alone = rf.fly(scenarios[1], engine="python")
+    assert np.array_equal(together[1].data["position"], alone.data["position"])
+
+
+def test_what_differs_in_more_than_numbers_is_refused() -> None:
+    a = rf.load_scenario("paper-set-point", SHORT)
+    b = rf.load_scenario("paper-set-point", {**SHORT, "wind.kind": "none"})
+    with pytest.raises(rf.InputError, match="differs from the first in more than numbers"):
+        rf.fly_all([a, b])
+
+
+@pytest.mark.parametrize("bad", [{"seed": -1}, {"seed": 1.5}, *({"seed": 1, "spread": s} for s in (0.0, 1.0, -0.1))])
+def test_neighbours_out_of_range_are_refused(bad: dict[str, Any]) -> None:
+    with pytest.raises(rf.InputError, match=r"(seed|spread): got .*; allowed: "):
+        rf.neighbour(rf.load_scenario("paper-set-point", SHORT), **bad)
+
+
+@pytest.mark.parametrize("key", ["fault.7.loss", "duration.x.y", "duration.x"])
+def test_a_wrong_key_from_python_is_told_without_the_command_line(key: str) -> None:
+    with pytest.raises(rf.InputError) as caught:
+        rf.fly("paper-set-point", settings={key: 0.3})
+    assert str(caught.value).startswith(f"{key}: ")
+
+
+# ------------------------------------------------------------------------------------------------------------- files
+
+
+def test_a_full_disk_leaves_nothing(short: rf.Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 itself must not write the file: on a full disk it ends the process."""
+
+    def full(self: Path, data: object) -> int:
+        self.touch()
+        raise OSError(errno.ENOSPC, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        short.save(tmp_path / "flight.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("method", ["save", "to_csv"])
+def test_a_missing_folder_is_told(short: rf.Flight, method: str, tmp_path: Path) -> None:
+    with pytest.raises(rf.InputError, match=r"there is no folder .*nowhere; make it") as caught:
+        getattr(short, method)(tmp_path / "nowhere" / "flight.out")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_lacks_something_is_refused(short: rf.Flight, tmp_path: Path) -> None:
+    path = tmp_path / "flight.nc"
+    rf.Flight(short.data.drop_vars("lyapunov"), short.outcome).save(path)
+    with pytest.raises(rf.InputError, match=r"flight\.nc: signal 'lyapunov' is missing"):
+        rf.load(path)
+    without = short.data.copy()
+    del without.attrs["outcome"]
+    rf.Flight(without, short.outcome).save(path)
+    with pytest.raises(rf.InputError, match=r"flight\.nc: attribute 'outcome' is missing"):
+        rf.load(path)
+
+
+def test_a_flight_along_a_table_is_repeated_without_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table is longer than the 64 KiB that HDF5 holds in a plain attribute."""
+    table = tmp_path / "way.csv"
+    rows = [f"{k * 1e-3:.3f},{math.sin(k * 1e-3):.15f},0,{0.1 + k * 1e-5:.15f}" for k in range(3000)]
+    table.write_text("\n".join(["t,x,y,z", *rows]) + "\n")
+    monkeypatch.chdir(tmp_path)
+    settings = {**SHORT, "reference": {"kind": "csv", "file": "way.csv"}}
+    flight = rf.fly("paper-set-point", settings=settings)
+    path = flight.save(tmp_path / "flight.nc")
+    table.unlink()
+    monkeypatch.chdir("/")
+    again = rf.repeat(path)
+    assert again.data.equals(flight.data)
+    # Another file given later is read, whatever the scenario held before.
+    other = tmp_path / "other.csv"
+    other.write_text("t,x,y,z\n0,5,0,0\n1,5,0,0\n")
+    assert flight.scenario is not None
+    moved = rf.fly(flight.scenario, settings={"reference.file": str(other)})
+    assert moved.data["position_reference"].values[0, 0] == 5.0

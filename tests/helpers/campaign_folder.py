@@ -1,0 +1,101 @@
+"""A folder of a campaign with made-up results, and a process that writes one."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from places import HELPERS
+
+from rotorfault.campaigns.store.store import Key, Store
+
+STUDY: dict[str, Any] = {"name": "test", "wind": {"speed": 5.0}, "losses": [0.1, 0.2]}
+BLOCKS: list[Key] = [*((0, block) for block in range(6)), *((1, block) for block in range(4))]
+
+needs_posix = pytest.mark.skipif(os.name == "nt", reason="needs signals and limits of POSIX")
+
+
+def results(round: int, block: int, flights: int = 20) -> pa.Table:
+    """What flying a block would give: the same in every process."""
+    rng = np.random.default_rng((round, block))
+    cost = rng.random(flights)
+    cost[0] = np.nan
+    return pa.table(
+        {
+            "flight": np.arange(flights),
+            "fault.0.loss": rng.random(flights),
+            "seed": rng.integers(0, 2**40, flights),
+            "outcome": rng.choice(["settled", "offset", "tumbled"], flights),
+            "survived": rng.random(flights) < 0.7,
+            "cost": cost,
+        }
+    )
+
+
+def start(folder: Path, study: dict[str, Any] = STUDY, digest: str = "program") -> Store:
+    return Store.create(folder, study, digest)
+
+
+def filled(folder: Path, blocks: list[Key] = BLOCKS) -> Path:
+    with start(folder) as store:
+        for key in blocks:
+            store.put(*key, results(*key))
+    return folder
+
+
+def part(folder: Path, round: int = 0, block: int = 2) -> Path:
+    return folder / "parts" / f"round-{round:03d}-block-{block:05d}.parquet"
+
+
+@functools.lru_cache(maxsize=1)
+def undisturbed() -> pa.Table:
+    """The rows of all blocks, put together without a store."""
+    pieces = []
+    for round, block in BLOCKS:
+        table = results(round, block)
+        for at, (name, value) in enumerate({"round": round, "block": block}.items()):
+            table = table.add_column(at, name, pa.array([value] * len(table), pa.int32()))
+        pieces.append(table)
+    return pa.concat_tables(pieces).combine_chunks()
+
+
+def everything(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+# Puts every missing block, says so, and waits to be killed; `{trap}` may end it at a certain point before.
+WRITER = """
+import os, random, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, {helpers!r})
+from campaign_folder import BLOCKS, STUDY, Store, results, start
+folder = Path({folder!r})
+known = (folder / "study.json").exists()
+store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
+blocks = store.missing([(r, b) for r in range(3) for b in range(100)])
+random.Random({seed}).shuffle(blocks)
+{trap}
+for key in blocks:
+    store.put(*key, results(*key))
+    print("put", flush=True)
+print("end", flush=True)
+time.sleep(600)
+"""
+
+
+def writer(folder: Path, seed: int = 0, trap: str = "") -> subprocess.Popen[str]:
+    code = WRITER.format(helpers=str(HELPERS), folder=str(folder), seed=seed, trap=trap)
+    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+
+
+def flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 1
+    path.write_bytes(content)

@@ -1,0 +1,278 @@
+"""The documentation says what the code does: tables, links, paths, names, commands."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+import re
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import typer.main
+from places import DOCS, ROOT, SOURCE
+
+import rotorfault as rf
+from rotorfault.autopilot.control.cascade import CascadeSettings
+from rotorfault.base.config import parse_toml
+from rotorfault.campaigns.study import study_from
+from rotorfault.cli.catalogue import REGISTRIES, entries
+from rotorfault.cli.main import app
+from rotorfault.flight.flight import prepare
+from rotorfault.scenario.scenario import parse_overrides, scenario_from
+
+PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
+TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+PAGE_OF = {
+    "references": "scenarios.md",
+    "winds": "scenarios.md",
+    "faults": "scenarios.md",
+    "sensors": "scenarios.md",
+    "diagnoses": "diagnosis.md",
+    "allocators": "allocation.md",
+    "responses": "scenarios.md",
+}
+TOP = ("src", "docs", "tests", "tools", "examples", "benchmarks")
+
+
+def name_of(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+every_page = pytest.mark.parametrize("path", PAGES, ids=name_of)
+
+
+def _tool() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("settings_tables", ROOT / "tools" / "settings_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+TOOL = _tool()
+TABLES: dict[str, str] = TOOL.tables()
+
+
+def prose(path: Path) -> str:
+    return FENCE.sub("", TEXT[path])
+
+
+def blocks(*languages: str) -> Iterator[tuple[Path, str]]:
+    for path, text in TEXT.items():
+        yield from ((path, body) for language, body in FENCE.findall(text) if language in languages)
+
+
+def ticked(path: Path) -> list[str]:
+    return re.findall(r"`([^`\n]+)`", prose(path))
+
+
+def anchors(path: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", FENCE.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+def section(page: str, kind: str) -> str:
+    """Text below the heading that names a kind, up to the next heading of the same or a higher level."""
+    text = TEXT[DOCS / page]
+    title = kind.replace("_", "[_ ]")
+    for match in re.finditer(rf"^(#+) {title}\b.*$", text, re.MULTILINE | re.IGNORECASE):
+        rest = text[match.end() :]
+        end = re.search(rf"^#{{1,{len(match[1])}}} ", rest, re.MULTILINE)
+        found = rest[: end.start()] if end else rest
+        if f"/{kind} -->" in found:
+            return found
+    raise AssertionError(f"docs/{page} has no section '{kind}' with its settings table")
+
+
+# -------------------------------------------------------------------------------------------------------- settings
+
+
+@every_page
+def test_tables_are_those_of_the_code(path: Path) -> None:
+    wrong = [block[2] for block in TOOL.BLOCK.finditer(TEXT[path]) if block[3].strip() != TABLES[block[2]].strip()]
+    assert not wrong, f"{name_of(path)}: {wrong} out of date; run: python tools/settings_tables.py --write"
+
+
+@pytest.mark.parametrize(
+    ("group", "kind"), [(g, k) for g, registry in REGISTRIES.items() if g in PAGE_OF for k in registry]
+)
+def test_every_part_has_a_section_with_all_its_settings(group: str, kind: str) -> None:
+    text = section(PAGE_OF[group], kind)
+    assert f"<!-- table: {group}/{kind} -->" in text
+    for setting in TOOL.settings(REGISTRIES[group][kind].Settings):
+        assert f"`{setting.key}`" in text
+
+
+@pytest.mark.parametrize("kind", list(REGISTRIES["controllers"]))
+def test_every_controller_has_a_page_with_all_its_settings(kind: str) -> None:
+    page, index = DOCS / "controllers" / f"{kind}.md", DOCS / "controllers" / "index.md"
+    for title in ("Equations", "Settings", "Presets", "Where it differs from the paper", "When it fails"):
+        assert f"\n## {title}\n" in TEXT[page], title
+    law = REGISTRIES["controllers"][kind].Settings.model_fields["law"].annotation
+    for setting in TOOL.settings(law, "law."):
+        assert f"`{setting.key}`" in TEXT[page]
+    for setting in TOOL.settings(CascadeSettings, "cascade."):
+        assert f"`{setting.key}`" in TEXT[index]
+    assert f"({kind}.md)" in TEXT[index]
+
+
+def test_every_table_stands_somewhere() -> None:
+    used = {block[2] for text in TEXT.values() for block in TOOL.BLOCK.finditer(text)}
+    assert used == set(TABLES)
+
+
+def test_settings_see_into_models_and_lists() -> None:
+    """The tool that the tables hang on: nested, in lists, optional, with the outer model's defaults."""
+    found = {s.key: s for s in TOOL.settings(REGISTRIES["controllers"]["roismc"].Settings)}
+    assert found["law.attitude.gamma_0"].default != found["law.position.gamma_0"].default
+    layer = found["law.position.layer"]
+    assert (layer.default, layer.allowed, layer.unit) == ("`1.0`", "number > 0", "m/s or rad/s")
+    assert "[" not in layer.meaning
+    assert "points[].time" in {s.key for s in TOOL.settings(REGISTRIES["references"]["waypoints"].Settings)}
+    assert "law.match.error_floor" in {s.key for s in TOOL.settings(REGISTRIES["controllers"]["smc"].Settings)}
+
+
+@pytest.mark.parametrize("group", ["plants", "vehicles", "engines", "scenarios"])
+def test_what_is_listed_is_named(group: str) -> None:
+    """Plants, vehicles, engines and scenarios, which have no settings."""
+    everything = "".join(TEXT.values())
+    missing = [name for name in entries()[group] if not re.search(rf"[`\" ]{re.escape(name)}\b", everything)]
+    assert not missing
+
+
+def test_summary_and_outcomes_are_defined() -> None:
+    text = TEXT[DOCS / "scenarios.md"]
+    settings = {"duration": 0.02, "fault.0.time": 0.0, "fault.1.time": 0.01}
+    summary = rf.fly("paper-set-point", settings=settings, engine="python").summary()
+    assert summary["detections"]
+    for key in [*summary, *summary["detections"][0]]:
+        assert f"`{key}`" in text, key
+    for outcome in ("settled", "tracked", "offset", "landed", "ground", "tumbled", "diverged", "interrupted"):
+        assert f"| `{outcome}` |" in text
+
+
+# ----------------------------------------------------------------------------------------------- links, paths, names
+
+
+@every_page
+def test_links_resolve(path: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(path)):
+        if re.match(r"https?://", target):
+            continue
+        file, _, anchor = target.partition("#")
+        page = (path.parent / file).resolve() if file else path
+        assert page.exists(), target
+        if anchor:
+            assert anchor in anchors(page), target
+
+
+@every_page
+def test_paths_exist(path: Path) -> None:
+    for word in ticked(path):
+        file, _, name = word.partition("::")
+        if not re.fullmatch(r"[\w.-]+(/[\w.-]+)*\.(py|toml|md|txt)|(src|docs|tests|tools|examples)(/[\w.-]+)+", file):
+            continue
+        if "/" not in file and not file.endswith(".py"):
+            continue  # a user's own file
+        file, _, _ = file.partition(":")
+        found = [base / file for base in (ROOT, SOURCE) if (base / file).exists()]
+        assert found, word
+        if name:
+            tree = ast.parse(found[0].read_text(encoding="utf-8"))
+            assert name in {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}, word
+
+
+@every_page
+def test_names_of_the_package_exist(path: Path) -> None:
+    for word in ticked(path):
+        if re.fullmatch(r"rotorfault(\.\w+)+", word):
+            assert _resolves(word), word
+
+
+def _resolves(word: str) -> bool:
+    parts = word.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found: Any = importlib.import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[cut:]:
+            found = getattr(found, part, None)
+        return found is not None
+    return False
+
+
+@every_page
+def test_pages_name_no_machine_and_stay_within_their_width(path: Path) -> None:
+    assert not re.search(r"(?<![\w.])/(?:tmp|work|home|root)/|\.\./shared", TEXT[path])
+    free = re.compile(r"^\||^\$\$|\]\(")  # tables, formulas and links cannot be broken
+    assert not [line for line in prose(path).splitlines() if len(line) > 120 and not free.search(line)]
+
+
+# ---------------------------------------------------------------------------------------------------- code, commands
+
+
+OVERRIDES = {
+    word.removeprefix("--set ") for path in PAGES for word in ticked(path) if re.fullmatch(r"--set [^ ]+=[^ ]+", word)
+}
+COMMANDS = [
+    (name_of(path), line)
+    for path, body in blocks("sh", "bash", "console")
+    for line in body.replace("\\\n", " ").splitlines()
+    if line.startswith("rotorfault ")
+]
+
+
+@pytest.mark.parametrize(("page", "line"), COMMANDS)
+def test_commands_are_understood(page: str, line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Subcommand, options and overrides exist; files that a user makes on the way need not."""
+    monkeypatch.chdir(ROOT)
+    _, name, *arguments = shlex.split(line, comments=True)
+    command = typer.main.get_command(app).commands[name]  # type: ignore[attr-defined]
+    given = command.make_context(name, list(arguments)).params
+    scenario, controller = given.get("scenario"), given.get("controller")
+    if scenario is None or scenario.endswith(".toml"):
+        return
+    if controller is not None and ".py:" in controller:
+        file, _, inner = controller.partition(":")
+        assert f"class {inner}" in (ROOT / file).read_text(encoding="utf-8")
+        controller = None
+    pairs = parse_overrides([p for p in given["assignments"] or [] if "mine.toml" not in p])
+    if given.get("preset"):
+        pairs = {"controller.preset": given["preset"], **pairs}
+    prepare(scenario, controller, pairs)
+
+
+@pytest.mark.parametrize("pair", sorted(OVERRIDES - {"key=value"}))
+def test_overrides_in_the_text_are_valid(pair: str) -> None:
+    prepare("paper-set-point", settings=parse_overrides([pair]))
+
+
+def test_python_code_compiles() -> None:
+    found = list(blocks("python"))
+    assert found
+    for path, body in found:
+        compile(body, name_of(path), "exec")
+
+
+def test_scenarios_and_parts_in_toml_are_valid() -> None:
+    found = list(blocks("toml"))
+    assert found
+    for path, body in found:
+        tables = parse_toml(body, name_of(path))
+        if "axis" in tables:
+            study_from(tables, name_of(path))
+        elif "duration" in tables:
+            scenario_from(tables, name_of(path))
+        else:
+            prepare("paper-set-point", settings=tables)
