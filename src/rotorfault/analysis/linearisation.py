@@ -1,7 +1,11 @@
-r"""The closed loop about hover as a linear discrete system.
+r"""Linearisation about hover: of the body, open loop, and of the closed loop as a linear discrete system.
 
-With x all numbers that a flight carries from one sampling instant to the next (plant and autopilot memory), d a
-wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
+The body: :math:`\dot x = A x + B u`, with the Jacobian taken by central differences of the rigid-body plant itself,
+about level hover in still air with sound rotors, so it is not a second copy of the equations. Attitude stands for
+small rotations about the body axes.
+
+The closed loop: with x all numbers that a flight carries from one sampling instant to the next (plant and autopilot
+memory), d a wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
 
 .. math:: x_{k+1} = f(x_k, d_k), \quad y_k = h(x_k) \qquad\Rightarrow\qquad
           x_{k+1} = A x_k + B d_k, \quad y_k = C x_k
@@ -36,11 +40,16 @@ from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.signals import Command, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.plant.plant import Plant
-from rotorfault.plant.wind import NoWind
+from rotorfault.plant.rigid_body import RigidBody
+from rotorfault.plant.wind import Air, NoWind
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+# Of the body, open loop.
+STATES = ("x", "y", "z", "v_x", "v_y", "v_z", "roll", "pitch", "yaw", "p", "q", "r")
+INPUTS = ("T", "tau_roll", "tau_pitch", "tau_yaw")
+# Of the plant's input in the closed loop.
 AXES = ("thrust", "roll", "pitch", "yaw")
 STEP = 1e-5  # of a central difference, relative to max(1, |x|)
 SETTLED = 1e-11  # relative change per period below which the loop counts as settled
@@ -81,7 +90,17 @@ class LinearLoop(NamedTuple):
         return bool(np.all(np.abs(self.poles) < 1.0))
 
     def loop_transfer(self, omega: Array) -> Complex:
-        """L of `rotorfault.analysis.margins` for each axis at frequencies in rad/s up to pi/period; shape (frequencies, 4)."""
+        """L of `rotorfault.analysis.margins` for each axis.
+
+        Parameters
+        ----------
+        omega : ndarray, shape (frequencies,)
+            rad/s, up to pi/period.
+
+        Returns
+        -------
+        ndarray, shape (frequencies, 4)
+        """
         z = np.exp(1j * np.asarray(omega, dtype=float) * self.period)
         resolvent = z[:, None, None] * np.eye(len(self.A)) - self.A
         T = np.einsum("in,wni->wi", self.C, np.linalg.solve(resolvent, self.B[None] + 0j))
@@ -112,7 +131,68 @@ class LinearLoop(NamedTuple):
         return big
 
 
-# ------------------------------------------------------------------------------------------------------ linearisation
+# ------------------------------------------------------------------------------------------------- the body, open loop
+
+
+def hover_model(vehicle: Vehicle) -> tuple[Array, Array]:
+    """Linearisation x_dot = A x + B u of the body about hover, u the wrench less that of hover.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Sound rotors.
+
+    Returns
+    -------
+    A : ndarray, shape (12, 12)
+        States in the order of `STATES`: m, m/s, rad, rad/s.
+    B : ndarray, shape (12, 4)
+        Inputs in the order of `INPUTS`: N, N m.
+    """
+    model, still = RigidBody(), Air(zeros(), zeros())
+
+    def rates(x: Array, u: Array) -> Array:
+        p, v, angle, omega = (Vec3(*part.tolist()) for part in x.reshape(4, 3))
+        wrench = Wrench(vehicle.mass * vehicle.gravity + float(u[0]), Vec3(*u[1:].tolist()))
+        dot = model.derivative(model.initial(p, v, angle, omega), wrench, zeros(), vehicle, 0.0, still)
+        # About zero attitude twice the vector part of the quaternion's derivative is that of the angles.
+        return np.array(
+            [*flatten((dot.p_W, dot.v_W)), 2.0 * dot.q_WB.x, 2.0 * dot.q_WB.y, 2.0 * dot.q_WB.z, *dot.omega_B]
+        )
+
+    x, u = np.zeros(12), np.zeros(4)
+    A = [(rates(x + e, u) - rates(x - e, u)) / (2.0 * STEP) for e in STEP * np.eye(12)]
+    B = [(rates(x, u + e) - rates(x, u - e)) / (2.0 * STEP) for e in STEP * np.eye(4)]
+    return np.array(A).T, np.array(B).T
+
+
+def equations(vehicle: Vehicle) -> list[str]:
+    """`hover_model` as text, one equation per state that has any term.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Sound rotors.
+
+    Returns
+    -------
+    list of str
+        Indented by two spaces, within 100 columns; the last line is the lag of the rotors.
+    """
+    A, B = hover_model(vehicle)
+    lines = []
+    for name, row in zip(STATES, np.hstack([A, B]), strict=True):
+        terms = [f"{value:+.5g} {of}" for value, of in zip(row, (*STATES, *INPUTS), strict=True) if abs(value) > 1e-7]
+        if terms:
+            text = " ".join(terms).removeprefix("+").replace("+", "+ ").replace(" -", " - ").replace("e+ ", "e+")
+            lines.append(f"  d {name}/dt = {text}")
+    lines.append(
+        f"  each thrust follows its command with {vehicle.rotor_bandwidth:g} rad/s, gain {vehicle.rotor_gain:g}"
+    )
+    return lines
+
+
+# -------------------------------------------------------------------------------------------------- the closed loop
 
 
 def calm(

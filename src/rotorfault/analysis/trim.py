@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
-from rotorfault.analysis.hover_model import equations
-from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, linearise
+from rotorfault.analysis.hover import Attainable, attainable, attainable_lines
+from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.autopilot.allocation import ALLOCATORS
