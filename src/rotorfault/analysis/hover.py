@@ -30,9 +30,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.text_table import table_lines
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import (
     NAN,
@@ -193,7 +195,7 @@ def critical_loss(
 
 def critical_pair(
     vehicle: Vehicle, rotor_a: int, rotor_b: int, losses_a: ArrayLike, yaw: bool = True, wind_W: Vec3 | None = None
-) -> NDArray[np.float64]:
+) -> Array:
     """Boundary for two faulty rotors: the critical loss of one over the loss of the other, the rest sound.
 
     Parameters
@@ -306,31 +308,30 @@ def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
     """
     m = report.margin
     lost = [f"rotor {i} lost {x:g}" for i, x in enumerate(report.loss, start=1) if x > 0.0]
-    lines = [
-        f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
-        f"  {'':12}  possible  {'largest thrust [N]':>18}  torque in reserve about roll, pitch, yaw [N m]",
-    ]
+    kinds = [("", "possible", "largest thrust [N]", "torque in reserve about roll, pitch, yaw [N m]")]
     for name, possible, most, reserve in (
         ("yaw held", m.with_yaw, m.thrust_with_yaw, list(report.reserve_with_yaw)),
         ("yaw given up", m.without_yaw, m.thrust_without_yaw, list(report.reserve_without_yaw)[:2]),
     ):
         torque = ", ".join(f"{t:.3g}" for t in reserve) if possible else "-"
-        lines.append(f"  {name:12}  {'yes' if possible else 'no':8}  {_thrust(most):>18}  {torque}")
+        kinds.append((name, "yes" if possible else "no", _thrust(most), torque))
     enough = "enough thrust on average, which is all that is known" if m.spinning else "-"
-    lines.append(
-        f"  {'spinning':12}  {'perhaps' if m.spinning else 'no':8}  {_thrust(m.thrust_spinning):>18}  {enough}"
-    )
+    kinds.append(("spinning", "perhaps" if m.spinning else "no", _thrust(m.thrust_spinning), enough))
+    critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", "1", "2", "3", "4")]
+    for name, losses in (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw)):
+        critical.append((name, *("none" if math.isnan(x) else f"{x:.4f}" for x in losses)))
+    left_over = []
     if m.without_yaw and not m.with_yaw:
         turn = m.yaw_torque / vehicle.inertia.z
-        lines.append(
-            f"  yaw torque left over    {m.yaw_torque:.3g} N m, which turns the body faster by {turn:.3g} rad/s^2"
-        )
-    rows = (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw))
-    lines.append(f"  largest loss of one rotor, the others as they are {'1':>8}{'2':>8}{'3':>8}{'4':>8}")
-    for name, critical in rows:
-        cells = "".join(f"{'none' if math.isnan(x) else format(x, '.4f'):>8}" for x in critical)
-        lines.append(f"  {name:48}  {cells}")
-    return lines
+        left_over = [
+            f"  yaw torque left over  {m.yaw_torque:.3g} N m, which turns the body faster by {turn:.3g} rad/s^2"
+        ]
+    return [
+        f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
+        *table_lines(kinds, "<<><", indent=2),
+        *left_over,
+        *table_lines(critical, "<>>>>", indent=2),
+    ]
 
 
 def _most_tilt_yaw_free(low: PerRotor, high: PerRotor, needed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:

@@ -33,6 +33,7 @@ from rotorfault.autopilot.autopilot import Autopilot
 from rotorfault.autopilot.diagnosis import DIAGNOSES
 from rotorfault.base.errors import InputError
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, level_start, quiet
+from rotorfault.maths.arrays import Array, Complex
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
@@ -42,9 +43,6 @@ from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.plant.plant import Plant
 from rotorfault.plant.rigid_body import RigidBody
 from rotorfault.plant.wind import Air, NoWind
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Of the body, open loop.
 STATES = ("x", "y", "z", "v_x", "v_y", "v_z", "roll", "pitch", "yaw", "p", "q", "r")

@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.analysis.linearisation import Complex
 from rotorfault.autopilot.allocation.available import thrust_available
 from rotorfault.autopilot.control.protocol import ControlInputs, ControlOutput, Prediction
+from rotorfault.maths.arrays import ANGLES, Complex
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.signals import Measurement, Reference
@@ -119,7 +119,7 @@ def reported_gains(
     direct = first_step(measurement._replace(p_W=reference.p_W + Vec3(0.1, 0.1, 0.0))).direct_acceleration_W
     rows = [
         *zip("xyz", told.gain_position, told.gain_velocity, direct, strict=True),
-        *zip(("roll", "pitch", "yaw"), told.gain_angle.diag, told.gain_rate.diag, zeros(), strict=True),
+        *zip(ANGLES, told.gain_angle.diag, told.gain_rate.diag, zeros(), strict=True),
     ]
     return tuple(AxisGains(axis, k1, k2, d != 0.0) for axis, k1, k2, d in rows if (k1, k2) != (0.0, 0.0))
 

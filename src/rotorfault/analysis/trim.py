@@ -27,7 +27,9 @@ from rotorfault.autopilot.diagnosis import DIAGNOSES
 from rotorfault.autopilot.presets import preset as preset_settings
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
+from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
+from rotorfault.maths.arrays import ANGLES
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.signals import Wrench
@@ -232,11 +234,17 @@ def _hover_lines(report: TrimReport) -> list[str]:
         f"Trim of '{report.vehicle}' with {report.controller}, sampled every {report.period:g} s",
         "",
         "Hover",
-        f"  thrust of a rotor       {h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})",
-        f"  speed of a rotor        {speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)",
-        f"  thrust to weight        {h.thrust_margin:.3g}",
-        f"  torque in reserve       {torque} N m about roll, pitch, yaw ({turn} rad/s^2)",
-        f"  rotor lag               {v.rotor_bandwidth:g} rad/s",
+        *table_lines(
+            [
+                ("thrust of a rotor", f"{h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})"),
+                ("speed of a rotor", f"{speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)"),
+                ("thrust to weight", f"{h.thrust_margin:.3g}"),
+                ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
+                ("rotor lag", f"{v.rotor_bandwidth:g} rad/s"),
+            ],
+            "<<",
+            indent=2,
+        ),
     ]
 
 
@@ -244,29 +252,26 @@ def _pole_lines(report: TrimReport) -> list[str]:
     if report.linear is None:
         return ["Closed-loop poles: none, the loop has no linearisation"]
     count, left = len(report.linear.names), len(report.linear.left_out)
-    rows = [
-        f"  {_complex(s):>22}  {abs(s):9.4g}  {-s.real / max(abs(s), 1e-300):7.3f}  {many:5d}  {motion}"
-        for s, many, motion in _distinct(report.linear)
-    ]
+    rows = [("pole [rad/s]", "|s| rad/s", "damping", "times", "motion")]
+    for s, times, motion in _distinct(report.linear):
+        rows.append((_complex(s), f"{abs(s):.4g}", f"{-s.real / max(abs(s), 1e-300):.3f}", str(times), motion))
     return [
         f"Closed-loop poles in hover, log(z)/T ({count} states; {left} that do not act on the motion left out)",
-        f"  {'pole [rad/s]':>22}  {'|s| rad/s':>9}  {'damping':>7}  {'times':>5}  motion",
-        *rows,
+        *table_lines(rows, ">>>><", indent=2),
     ]
 
 
 def _margin_lines(report: TrimReport) -> list[str]:
     if report.linear is None or not report.linear.stable:
         return ["Margins: none, for want of a loop that is stable in hover"]
-    lines = [
-        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
-        f"  axis    {'gain up':>16}  {'gain down':>17}  {'delay [ms]':>10}  {'phase [deg]':>11}  {'at rad/s':>10}",
-    ]
+    rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
     for axis, m in report.margins.items():
         up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
-        numbers = f"{1e3 * m.delay:10.3g}  {math.degrees(m.phase):11.3g}  {m.crossover:10.3g}"
-        lines.append(f"  {axis:6}  {up:>16}  {down:>17}  {numbers}")
-    return lines
+        rows.append((axis, up, down, f"{1e3 * m.delay:.3g}", f"{math.degrees(m.phase):.3g}", f"{m.crossover:.3g}"))
+    return [
+        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
+        *table_lines(rows, "<>>>>>", indent=2),
+    ]
 
 
 def _warning_lines(report: TrimReport) -> list[str]:
@@ -283,7 +288,6 @@ def _complex(s: complex) -> str:
 
 # Translation along x goes through pitch, along y through roll.
 _MOTION = {"p_W": ("pitch", "roll", "thrust"), "v_W": ("pitch", "roll", "thrust")}
-_TURN = ("roll", "pitch", "yaw")
 
 
 def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
@@ -293,7 +297,7 @@ def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
     for name, row in zip(linear.names, np.abs(vectors), strict=True):
         field, component = name.split(".")[-2:]
         if name.startswith("plant.body.") and component in "xyz":
-            motion[AXES.index(_MOTION.get(field, _TURN)["xyz".index(component)])] += row
+            motion[AXES.index(_MOTION.get(field, ANGLES)["xyz".index(component)])] += row
     with np.errstate(divide="ignore", invalid="ignore"):
         s = np.log(z.astype(complex)) / linear.period
     # Computed, a double real pole is a close complex pair.

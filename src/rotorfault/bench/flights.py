@@ -15,11 +15,11 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from rotorfault.base.progress import Say
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Batch, no_watch
 from rotorfault.flight.flight import fly
@@ -29,8 +29,6 @@ from rotorfault.scenario.scenario import Scenario, load_scenario
 
 SIZES = (100, 1_000, 10_000)
 PERIOD = 1e-3  # s, of sampling and integration
-
-Say = Callable[[str], None]
 
 
 def scenario(duration: float, **settings: Any) -> Scenario:

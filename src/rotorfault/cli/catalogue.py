@@ -16,6 +16,7 @@ from rotorfault.base.config import parse_toml, read_text
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import output_folder, write_atomically
 from rotorfault.base.registry import Registry, unknown
+from rotorfault.base.text_table import table_lines
 from rotorfault.campaigns.studies import study_names
 from rotorfault.engine import ENGINES
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
@@ -72,7 +73,7 @@ def text(group: str | None = None) -> str:
     width = max(len(name) for names in shown.values() for name in names)
     blocks = []
     for title, names in shown.items():
-        blocks.append("\n".join([title, *(f"  {name.ljust(width)}  {about}" for name, about in names.items())]))
+        blocks.append("\n".join([title, *table_lines(list(names.items()), "<<", indent=2, least=[width])]))
     return "\n\n".join(blocks)
 
 

@@ -20,13 +20,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from rotorfault.base.errors import InputError
+from rotorfault.maths.arrays import Array
 from rotorfault.report.style import (
     BLACK,
     COLOURS,
     GREY,
     LIGHT,
     LINES,
-    Array,
     envelope,
     number,
     padded,

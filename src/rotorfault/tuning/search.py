@@ -14,8 +14,9 @@ import numpy as np
 from rotorfault._version import __version__
 from rotorfault.base.errors import InputError
 from rotorfault.engine import default_engine, load_engine
-from rotorfault.engine.batch import Array, no_watch
+from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble_all
+from rotorfault.maths.arrays import Array
 from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.space import SPACES, settings_at
 from rotorfault.tuning.training import objective, training_groups

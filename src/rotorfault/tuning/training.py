@@ -17,19 +17,18 @@ Objective of a flight, the smaller the better:
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from rotorfault.engine.batch import Array
-from rotorfault.model.telemetry import SIGNAL_NAMES, quantities
+from rotorfault.loop.scoring import SETTLED
+from rotorfault.maths.arrays import Array
+from rotorfault.results.flight_data import flight_data
 from rotorfault.results.metrics import cost, first_loss
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario, load_scenario
 
 LOST = 10.0
-BAND = 0.02
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
 _FAULTY = np.array([1.0, 0.0, 1.0, 0.0])
 _TRACKING = {"paper-sinusoid": 10.0, "paper-square": 2.0}
@@ -80,7 +79,7 @@ def objective(scenario: Scenario, signals: Array, times: Array) -> float:
     """
     if first_loss(signals, None) is not None:
         return LOST
-    data = columns(signals, times)
+    data = flight_data(signals, times, {})
     flags = data["fault_flag"].values
     onset = float(scenario.fault[0].settings.time)
     k = int(np.searchsorted(times, onset - 1e-9))
@@ -101,7 +100,7 @@ def objective(scenario: Scenario, signals: Array, times: Array) -> float:
 
 
 def _settling(error: Array, times: Array, onset: float, k: int) -> float:
-    excess = np.max(np.abs(error) / (BAND * np.abs(error[0])), axis=1)
+    excess = np.max(np.abs(error) / (SETTLED * np.abs(error[0])), axis=1)
     every = float(times[1] - times[0])
     before, after = np.flatnonzero(excess[:k] > 1.0), np.flatnonzero(excess[k:] > 1.0)
     first = (before[-1] + 1) * every if len(before) else 0.0
@@ -110,15 +109,3 @@ def _settling(error: Array, times: Array, onset: float, k: int) -> float:
     if first < onset - every:
         return float(first + late + max(0.0, float(excess[k:].max()) - 0.7) + left)
     return float(0.6 * onset + late + left)
-
-
-def columns(signals: Array, times: Array) -> Any:
-    """Records by name, in the shape that `rotorfault.results.metrics` reads them, without the cost of a dataset."""
-    found: dict[str, Any] = {"time": SimpleNamespace(values=times)}
-    row = 0
-    for name in quantities():
-        width = sum(1 for full in SIGNAL_NAMES if full.partition(".")[0] == name)
-        block = signals[:, row : row + width]
-        found[name] = SimpleNamespace(values=block if width > 1 else block[:, 0])
-        row += width
-    return found

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from rotorfault.loop.scoring import SETTLED
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.results.metrics import attitude_error, cost
@@ -34,8 +35,6 @@ COST_READINGS: dict[str, dict[str, Any]] = {
     "floor 0.1 m in Q and R": {"floor": 0.1, "floor_r": 0.1},
     "floor in Q only": {"floor_r": 0.0},
 }
-
-Array = NDArray[np.float64]
 
 
 def measure(data: xr.Dataset) -> dict[str, Any]:
