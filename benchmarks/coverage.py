@@ -28,8 +28,8 @@ from scipy.stats import binom
 from rotorfault.campaigns.sampling.refine import Refinement, looks
 from rotorfault.campaigns.sampling.sampling_plan import Plan, sampling_plan
 from rotorfault.campaigns.sampling.statistics import Interval, clopper_pearson, wilson
+from rotorfault.maths.arrays import Array
 
-Array = NDArray[np.float64]
 Rule = tuple[list[NDArray[np.bool_]], list[Interval]]  # by look: where it ends, intervals
 
 SURVIVALS = (0.01, 0.1, 0.5, 0.9, 0.99, 0.999)

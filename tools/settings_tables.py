@@ -27,7 +27,8 @@ from rotorfault.cli.catalogue import REGISTRIES
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.model.telemetry import RPY, quantities
 from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
-from rotorfault.scenario.scenario import Mismatch, Part, Scenario, Start
+from rotorfault.scenario.scenario import Mismatch, Scenario, Start
+from rotorfault.scenario.part import Part
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)

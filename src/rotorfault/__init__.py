@@ -1,4 +1,4 @@
-"""rotorfault: design, prove and fly quadrotor control that survives rotor faults and wind.
+"""rotorfault: design, prove and fly multirotor control that survives rotor faults and wind.
 
     import rotorfault as rf
 
@@ -20,82 +20,158 @@ from rotorfault._version import __version__
 if TYPE_CHECKING:
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
     from rotorfault.analysis.trim import trim_report
-    from rotorfault.autopilot.control.protocol import (
-        CONTROLLERS,
-        ControlInputs,
-        Controller,
-        ControlOutput,
-        no_telemetry,
-    )
+    from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
+    from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
+    from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+    from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs
+    from rotorfault.autopilot.instant import Decision
+    from rotorfault.autopilot.response.protocol import Response, ResponseInputs
+    from rotorfault.base.config import Strict as Settings
     from rotorfault.base.errors import InputError
     from rotorfault.campaigns.api import Campaign, campaign
-    from rotorfault.flight.flight import Flight, fly, fly_all, load, repeat
+    from rotorfault.flight.check_block import BlockReport, check_block
+    from rotorfault.flight.flight import Flight, load
+    from rotorfault.flight.fly import fly, fly_all, repeat
     from rotorfault.flight.many import Flights, fly_many
     from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
     from rotorfault.maths.rotation import Quat
-    from rotorfault.model.signals import Measurement, Reference, Wrench
+    from rotorfault.model.block import Context, Nothing
+    from rotorfault.model.signals import Allocation, Diagnosis, Estimate, Reading, Readings, Reference, State, Wrench
+    from rotorfault.model.slot import register
+    from rotorfault.model.telemetry import Quantity
     from rotorfault.model.vehicle import Vehicle
     from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
+    from rotorfault.plant.faults import Effect, Fault, OneRotor
+    from rotorfault.plant.ground import Ground
+    from rotorfault.plant.models import BodyModel
+    from rotorfault.plant.sensors import SensorInputs, Sensors
+    from rotorfault.plant.timed import TimeInputs
+    from rotorfault.plant.wind import Air, Wind
+    from rotorfault.reference.sources import ReferenceSource, ReferenceTable
+    from rotorfault.scenario.library import load_scenario, scenario_names
     from rotorfault.scenario.neighbours import neighbour
-    from rotorfault.scenario.scenario import Scenario, load_scenario, scenario_names
+    from rotorfault.scenario.scenario import Scenario
 
 _HOME = {
-    "CONTROLLERS": "autopilot.control.protocol",
+    "Air": "plant.wind",
+    "Allocation": "model.signals",
+    "AllocationInputs": "autopilot.allocation.protocol",
+    "Allocator": "autopilot.allocation.protocol",
+    "BlockReport": "flight.check_block",
+    "BodyModel": "plant.models",
     "Campaign": "campaigns.api",
+    "Context": "model.block",
     "ControlInputs": "autopilot.control.protocol",
     "ControlOutput": "autopilot.control.protocol",
     "Controller": "autopilot.control.protocol",
+    "Decision": "autopilot.instant",
+    "Diagnoser": "autopilot.diagnosis.protocol",
+    "Diagnosis": "model.signals",
+    "DiagnosisInputs": "autopilot.diagnosis.protocol",
+    "Effect": "plant.faults",
+    "Estimate": "model.signals",
+    "Estimator": "autopilot.estimation.protocol",
+    "EstimatorInputs": "autopilot.estimation.protocol",
+    "Fault": "plant.faults",
     "Flight": "flight.flight",
     "Flights": "flight.many",
+    "Ground": "plant.ground",
     "InputError": "base.errors",
     "Mat3": "maths.geometry",
-    "Measurement": "model.signals",
+    "Nothing": "model.block",
+    "OneRotor": "plant.faults",
     "PerRotor": "maths.geometry",
-    "Quat": "maths.geometry",
+    "Quantity": "model.telemetry",
+    "Quat": "maths.rotation",
+    "Reading": "model.signals",
+    "Readings": "model.signals",
     "Reference": "model.signals",
+    "ReferenceSource": "reference.sources",
+    "ReferenceTable": "reference.sources",
+    "Response": "autopilot.response.protocol",
+    "ResponseInputs": "autopilot.response.protocol",
     "Scenario": "scenario.scenario",
+    "SensorInputs": "plant.sensors",
+    "Sensors": "plant.sensors",
+    "Settings": "base.config",
+    "State": "model.signals",
+    "TimeInputs": "plant.timed",
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
+    "Wind": "plant.wind",
     "Wrench": "model.signals",
+    "campaign": "campaigns.api",
+    "check_block": "flight.check_block",
     "critical_loss": "analysis.hover",
     "critical_pair": "analysis.hover",
-    "campaign": "campaigns.api",
-    "fly": "flight.flight",
-    "fly_all": "flight.flight",
+    "fly": "flight.fly",
+    "fly_all": "flight.fly",
     "fly_many": "flight.many",
     "hover_margin": "analysis.hover",
     "load": "flight.flight",
-    "load_scenario": "scenario.scenario",
+    "load_scenario": "scenario.library",
     "load_vehicle": "model.vehicle_file",
     "neighbour": "scenario.neighbours",
-    "no_telemetry": "autopilot.control.protocol",
-    "repeat": "flight.flight",
-    "scenario_names": "scenario.scenario",
+    "register": "model.slot",
+    "repeat": "flight.fly",
+    "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
     "trim_report": "analysis.trim",
     "vehicle_names": "model.vehicle_file",
 }
+_UNDER_ANOTHER_NAME = {"Settings": "Strict"}
 
 __all__ = [
-    "CONTROLLERS",
+    "Air",
+    "Allocation",
+    "AllocationInputs",
+    "Allocator",
+    "BlockReport",
+    "BodyModel",
     "Campaign",
+    "Context",
     "ControlInputs",
     "ControlOutput",
     "Controller",
+    "Decision",
+    "Diagnoser",
+    "Diagnosis",
+    "DiagnosisInputs",
+    "Effect",
+    "Estimate",
+    "Estimator",
+    "EstimatorInputs",
+    "Fault",
     "Flight",
     "Flights",
+    "Ground",
     "InputError",
     "Mat3",
-    "Measurement",
+    "Nothing",
+    "OneRotor",
     "PerRotor",
+    "Quantity",
     "Quat",
+    "Reading",
+    "Readings",
     "Reference",
+    "ReferenceSource",
+    "ReferenceTable",
+    "Response",
+    "ResponseInputs",
     "Scenario",
+    "SensorInputs",
+    "Sensors",
+    "Settings",
+    "State",
+    "TimeInputs",
     "Vec3",
     "Vehicle",
+    "Wind",
     "Wrench",
     "__version__",
     "campaign",
+    "check_block",
     "critical_loss",
     "critical_pair",
     "fly",
@@ -106,7 +182,7 @@ __all__ = [
     "load_scenario",
     "load_vehicle",
     "neighbour",
-    "no_telemetry",
+    "register",
     "repeat",
     "scenario_names",
     "torque_reserve",
@@ -118,9 +194,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'rotorfault' has no attribute '{name}'")
-    found = getattr(importlib.import_module(f"rotorfault.{_HOME[name]}"), name)
-    globals()[name] = found
-    return found
+    value = getattr(importlib.import_module(f"rotorfault.{_HOME[name]}"), _UNDER_ANOTHER_NAME.get(name, name))
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

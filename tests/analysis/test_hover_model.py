@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotorfault.analysis.hover_model import INPUTS, STATES, equations, hover_model
+from rotorfault.analysis.linearisation import INPUTS, STATES, equations, hover_model
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 
 

@@ -25,7 +25,7 @@ from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.model.signals import Measurement, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.scenario.library import load_scenario
 
 
 @pytest.mark.parametrize("direct", [False, True])

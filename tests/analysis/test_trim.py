@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from rotorfault.analysis.attainable import parse_losses
 from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.analysis.linearisation import AXES, LinearLoop, linearise
 from rotorfault.analysis.margins import Margins, margins
@@ -16,12 +15,13 @@ from rotorfault.analysis.trim import hover, hover_loop, trim_report
 from rotorfault.autopilot.control.protocol import CONTROLLERS
 from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.base.errors import InputError
+from rotorfault.cli.losses import parse_losses
 from rotorfault.flight.assembly import assemble
 from rotorfault.loop.closed_loop import Start, quiet
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.signals import Command, Measurement, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.scenario.library import load_scenario
 
 T = 0.002
 HOVER = Reference(zeros(), zeros(), zeros(), 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ import rotorfault as rf
 from rotorfault.engine import have_simd
 from rotorfault.engine.structure import structure
 from rotorfault.flight.assembly import assemble
-from rotorfault.loop.scoring import REST
+from rotorfault.loop.scores import REST
 
 SCENARIOS = ("land-after-fault", "land-after-fault-hummingbird")
 

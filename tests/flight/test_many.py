@@ -11,7 +11,8 @@ import rotorfault as rf
 from rotorfault.base.errors import InputError
 from rotorfault.engine import have_simd
 from rotorfault.flight import many
-from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.flight.sweep import checked_columns, groups_of
+from rotorfault.flight.assembly import assemble_group
 from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.scenario.scenario import Scenario, scenario_from
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from rotorfault.autopilot.allocation.available import thrust_available
 from rotorfault.autopilot.control import CONTROLLERS
 from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings
-from rotorfault.autopilot.control.protocol import ControlInputs, Prediction
+from rotorfault.autopilot.control.protocol import ControlInputs
+from rotorfault.autopilot.prediction import Prediction
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.signals import Measurement, Reference
 from rotorfault.model.vehicle import Vehicle

@@ -12,7 +12,8 @@ from rotorfault.engine import ENGINES, have_simd, load_engine
 from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.flight.assembly import assemble
 from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.scenario.scenario import Scenario, load_scenario, scenario_from
+from rotorfault.scenario.scenario import Scenario, scenario_from
+from rotorfault.scenario.library import load_scenario
 
 Array = NDArray[np.float64]
 POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_continuous_are
 
 from rotorfault.autopilot.control.riccati import (
     AttitudeProblem,
@@ -15,6 +16,7 @@ from rotorfault.autopilot.control.riccati import (
     newton_kleinman_step,
     routh_stable,
 )
+from rotorfault.autopilot.control.riccati_reference import DenseProblem, matrix
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten, unflatten
 
@@ -66,6 +68,17 @@ def rightmost(problem: AttitudeProblem, gain: Gain) -> np.ndarray:
     found = np.full(len(Y), np.nan)
     found[finite] = np.linalg.eigvals(A[finite]).real.max(1)
     return found
+
+
+def closed_loop_poles(problem: AttitudeProblem, gain: Gain) -> np.ndarray:
+    """The six poles in 1/s of the attitude block of one problem under a gain."""
+    zero, one_ = np.zeros((3, 3)), np.eye(3)
+    return np.linalg.eigvals(np.block([[zero, one_], [-matrix(gain.Y), matrix(problem.W) - matrix(gain.X)]]))
+
+
+def solve_dense(problem: DenseProblem) -> np.ndarray:
+    """P of (22), (6, 6), by SciPy's Schur method."""
+    return np.asarray(solve_continuous_are(problem.A, problem.B, problem.Q, problem.R))
 
 
 def exactly_stable(problem: AttitudeProblem, gain: Gain) -> bool:

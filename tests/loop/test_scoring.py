@@ -10,7 +10,8 @@ from engine_flights import every_engine, run, short
 
 import rotorfault
 from rotorfault.flight.assembly import assemble
-from rotorfault.loop.scoring import KINDS, Scoring, ScoringParameters
+from rotorfault.loop.scoring import KINDS, Scoring
+from rotorfault.loop.scores import ScoringParameters
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.records import unflatten
 from rotorfault.model.telemetry import SIGNAL_NAMES, _template

@@ -23,8 +23,9 @@ from rotorfault.base.config import parse_toml
 from rotorfault.campaigns.study import study_from
 from rotorfault.cli.catalogue import REGISTRIES, entries
 from rotorfault.cli.main import app
-from rotorfault.flight.flight import prepare
-from rotorfault.scenario.scenario import parse_overrides, scenario_from
+from rotorfault.flight.fly import prepare
+from rotorfault.scenario.scenario import scenario_from
+from rotorfault.scenario.overrides import parse_overrides
 
 PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
 TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.results import metrics
 from rotorfault.results.dataset import dataset
-from rotorfault.results.metrics import Outcome
+from rotorfault.results.outcome import Outcome
 
 Array = NDArray[np.float64]
 AXES = ("x", "y", "z")

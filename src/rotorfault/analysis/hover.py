@@ -1,4 +1,4 @@
-r"""Whether hover, or rest in a steady wind, is physically possible with given losses, whoever controls.
+r"""Attainable hover: whether hover, or rest in a steady wind, is physically possible with losses, whoever controls.
 
 Rotor i gives any thrust in [lo_i, hi_i] = (1 - loss_i) k [c_min, c_max]. Rest needs the thrust
 
@@ -27,12 +27,14 @@ from flight before the fault; for torque to spare see `torque_reserve`.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.text_table import table_lines
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import (
     NAN,
@@ -71,6 +73,17 @@ class HoverMargin(NamedTuple):
     without_yaw: Scalar  # 1/0, forces and tilt torques in balance
     spinning: Scalar  # 1/0, enough thrust on average: necessary, not sufficient
     yaw_torque: Scalar  # N m, what is left over of it at least without yaw, body z axis; NaN if without_yaw is 0
+
+
+class Attainable(NamedTuple):
+    """What hover in still air is possible with given losses; `TrimReport.attainable`."""
+
+    loss: PerRotor
+    margin: HoverMargin
+    reserve_with_yaw: Vec3  # N m about the body axes
+    reserve_without_yaw: Vec3  # N m, z is 0
+    critical_with_yaw: PerRotor  # largest loss of each rotor, the others as they are; NaN if there is none
+    critical_without_yaw: PerRotor
 
 
 def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -> HoverMargin:
@@ -181,8 +194,8 @@ def critical_loss(
 
 
 def critical_pair(
-    vehicle: Vehicle, rotor_a: int, rotor_b: int, losses_a: Any, yaw: bool = True, wind_W: Vec3 | None = None
-) -> NDArray[np.float64]:
+    vehicle: Vehicle, rotor_a: int, rotor_b: int, losses_a: ArrayLike, yaw: bool = True, wind_W: Vec3 | None = None
+) -> Array:
     """Boundary for two faulty rotors: the critical loss of one over the loss of the other, the rest sound.
 
     Parameters
@@ -206,8 +219,8 @@ def critical_pair(
     """
     if _index(rotor_a) == _index(rotor_b):
         raise InputError(f"rotor_b: got {rotor_b}, which is rotor_a; allowed: another one of 1 to 4")
-    given = np.asarray(losses_a, dtype=float)
-    loss = PerRotor.of(given if i == rotor_a else np.zeros_like(given) for i in (1, 2, 3, 4))
+    losses = np.asarray(losses_a, dtype=float)
+    loss = PerRotor.of(losses if i == rotor_a else np.zeros_like(losses) for i in (1, 2, 3, 4))
     return np.asarray(critical_loss(vehicle, rotor_b, yaw, wind_W, loss), dtype=float)
 
 
@@ -252,6 +265,75 @@ def torque_reserve(vehicle: Vehicle, loss: PerRotor, yaw: bool = True, wind_W: V
     return Vec3(tilt[0], tilt[1], upright * maximum(4.0 * spare.reduce(minimum) * vehicle.torque_ratio, 0.0))
 
 
+def attainable(vehicle: Vehicle, loss: PerRotor | None = None) -> Attainable:
+    """What hover in still air losses leave, and which further loss of a rotor would end it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Two opposite pairs of rotors.
+    loss : PerRotor, optional
+        Of each rotor, 0 to 1; all sound if not given.
+
+    Returns
+    -------
+    Attainable
+    """
+    loss = PerRotor.all(0.0) if loss is None else loss
+    with_yaw, without_yaw = (
+        PerRotor.of(critical_loss(vehicle, rotor, yaw, loss=loss) for rotor in (1, 2, 3, 4)) for yaw in (True, False)
+    )
+    return Attainable(
+        loss=loss,
+        margin=hover_margin(vehicle, loss),
+        reserve_with_yaw=torque_reserve(vehicle, loss),
+        reserve_without_yaw=torque_reserve(vehicle, loss, yaw=False),
+        critical_with_yaw=with_yaw,
+        critical_without_yaw=without_yaw,
+    )
+
+
+def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
+    """The same as text, within 100 columns.
+
+    Parameters
+    ----------
+    report : Attainable
+    vehicle : Vehicle
+        The one that the report is about.
+
+    Returns
+    -------
+    list of str
+    """
+    m = report.margin
+    lost = [f"rotor {i} lost {x:g}" for i, x in enumerate(report.loss, start=1) if x > 0.0]
+    kinds = [("", "possible", "largest thrust [N]", "torque in reserve about roll, pitch, yaw [N m]")]
+    for name, possible, most, reserve in (
+        ("yaw held", m.with_yaw, m.thrust_with_yaw, list(report.reserve_with_yaw)),
+        ("yaw given up", m.without_yaw, m.thrust_without_yaw, list(report.reserve_without_yaw)[:2]),
+    ):
+        torque = ", ".join(f"{t:.3g}" for t in reserve) if possible else "-"
+        kinds.append((name, "yes" if possible else "no", _thrust(most), torque))
+    enough = "enough thrust on average, which is all that is known" if m.spinning else "-"
+    kinds.append(("spinning", "perhaps" if m.spinning else "no", _thrust(m.thrust_spinning), enough))
+    critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", "1", "2", "3", "4")]
+    for name, losses in (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw)):
+        critical.append((name, *("none" if math.isnan(x) else f"{x:.4f}" for x in losses)))
+    left_over = []
+    if m.without_yaw and not m.with_yaw:
+        turn = m.yaw_torque / vehicle.inertia.z
+        left_over = [
+            f"  yaw torque left over  {m.yaw_torque:.3g} N m, which turns the body faster by {turn:.3g} rad/s^2"
+        ]
+    return [
+        f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
+        *table_lines(kinds, "<<><", indent=2),
+        *left_over,
+        *table_lines(critical, "<>>>>", indent=2),
+    ]
+
+
 def _most_tilt_yaw_free(low: PerRotor, high: PerRotor, needed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
     """Largest torque in N m about an axis with differences alpha and beta per torque [1/m], yaw torque free."""
 
@@ -271,12 +353,12 @@ def _most_tilt_yaw_free(low: PerRotor, high: PerRotor, needed: Scalar, alpha: Sc
 def _reaches(rooms: tuple[Scalar, ...], arms: tuple[Scalar, ...], scale: tuple[Scalar, Scalar]) -> list[Scalar]:
     """Largest t >= 0 with |arm| t <= room, each; 0 where there is no room, infinite where the arm is 0."""
     least = LEAST_ARM * (absolute(scale[0]) + absolute(scale[1]))
-    found = []
+    reaches = []
     for room, arm in zip(rooms, arms, strict=True):
         free = less(absolute(arm), least)
         reach = maximum(room, 0.0) / maximum(absolute(arm), least)
-        found.append(select(both(free, negated(less(room, 0.0))), room + math.inf, reach))
-    return found
+        reaches.append(select(both(free, negated(less(room, 0.0))), room + math.inf, reach))
+    return reaches
 
 
 def _thrust_ranges(vehicle: Vehicle, loss: PerRotor) -> tuple[PerRotor, PerRotor]:
@@ -301,3 +383,7 @@ def _index(rotor: int) -> int:
     if rotor not in (1, 2, 3, 4):
         raise InputError(f"rotor: got {rotor!r}; allowed: 1 to 4")
     return rotor - 1
+
+
+def _thrust(most: float) -> str:
+    return f"{most:.4g}" if most > -math.inf else "no balance"

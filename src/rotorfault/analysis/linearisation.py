@@ -1,7 +1,11 @@
-r"""The closed loop about hover as a linear discrete system.
+r"""Linearisation about hover: of the body, open loop, and of the closed loop as a linear discrete system.
 
-With x all numbers that a flight carries from one sampling instant to the next (plant and autopilot memory), d a
-wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
+The body: :math:`\dot x = A x + B u`, with the Jacobian taken by central differences of the rigid-body plant itself,
+about level hover in still air with sound rotors, so it is not a second copy of the equations. Attitude stands for
+small rotations about the body axes.
+
+The closed loop: with x all numbers that a flight carries from one sampling instant to the next (plant and autopilot
+memory), d a wrench added at the plant's input and y the wrench that the commands ask for, one sampling period is
 
 .. math:: x_{k+1} = f(x_k, d_k), \quad y_k = h(x_k) \qquad\Rightarrow\qquad
           x_{k+1} = A x_k + B d_k, \quad y_k = C x_k
@@ -18,29 +22,29 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.autopilot.allocation import ALLOCATORS
-from rotorfault.autopilot.allocation.protocol import settings_class
-from rotorfault.autopilot.autopilot import Autopilot
-from rotorfault.autopilot.diagnosis import DIAGNOSES
 from rotorfault.base.errors import InputError
-from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState, level_start, quiet
+from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.maths.arrays import Array, Complex
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.block import Context
 from rotorfault.model.mixer import nominal_inverse
-from rotorfault.model.signals import Command, Reference, Wrench
+from rotorfault.model.signals import Command, Wrench
+from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, wrench_of
-from rotorfault.plant.plant import Plant
-from rotorfault.plant.wind import NoWind
+from rotorfault.plant.rigid_body import RigidBody
+from rotorfault.plant.wind import Air
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
+# Of the body, open loop.
+STATES = ("x", "y", "z", "v_x", "v_y", "v_z", "roll", "pitch", "yaw", "p", "q", "r")
+INPUTS = ("T", "tau_roll", "tau_pitch", "tau_yaw")
+# Of the plant's input in the closed loop.
 AXES = ("thrust", "roll", "pitch", "yaw")
 STEP = 1e-5  # of a central difference, relative to max(1, |x|)
 SETTLED = 1e-11  # relative change per period below which the loop counts as settled
@@ -81,7 +85,17 @@ class LinearLoop(NamedTuple):
         return bool(np.all(np.abs(self.poles) < 1.0))
 
     def loop_transfer(self, omega: Array) -> Complex:
-        """L of `rotorfault.analysis.margins` for each axis at frequencies in rad/s up to pi/period; shape (frequencies, 4)."""
+        """L of `rotorfault.analysis.margins` for each axis.
+
+        Parameters
+        ----------
+        omega : ndarray, shape (frequencies,)
+            rad/s, up to pi/period.
+
+        Returns
+        -------
+        ndarray, shape (frequencies, 4)
+        """
         z = np.exp(1j * np.asarray(omega, dtype=float) * self.period)
         resolvent = z[:, None, None] * np.eye(len(self.A)) - self.A
         T = np.einsum("in,wni->wi", self.C, np.linalg.solve(resolvent, self.B[None] + 0j))
@@ -112,31 +126,96 @@ class LinearLoop(NamedTuple):
         return big
 
 
-# ------------------------------------------------------------------------------------------------------ linearisation
+# ------------------------------------------------------------------------------------------------- the body, open loop
+
+
+def hover_model(vehicle: Vehicle) -> tuple[Array, Array]:
+    """Linearisation x_dot = A x + B u of the body about hover, u the wrench less that of hover.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Sound rotors.
+
+    Returns
+    -------
+    A : ndarray, shape (12, 12)
+        States in the order of `STATES`: m, m/s, rad, rad/s.
+    B : ndarray, shape (12, 4)
+        Inputs in the order of `INPUTS`: N, N m.
+    """
+    model, still = RigidBody(), Air(zeros(), zeros())
+
+    def rates(x: Array, u: Array) -> Array:
+        p, v, angle, omega = (Vec3(*part.tolist()) for part in x.reshape(4, 3))
+        wrench = Wrench(vehicle.mass * vehicle.gravity + float(u[0]), Vec3(*u[1:].tolist()))
+        dot = model.derivative(model.start(p, v, angle, omega), wrench, zeros(), vehicle, 0.0, still)
+        # About zero attitude twice the vector part of the quaternion's derivative is that of the angles.
+        return np.array(
+            [*flatten((dot.p_W, dot.v_W)), 2.0 * dot.q_WB.x, 2.0 * dot.q_WB.y, 2.0 * dot.q_WB.z, *dot.omega_B]
+        )
+
+    x, u = np.zeros(12), np.zeros(4)
+    A = [(rates(x + e, u) - rates(x - e, u)) / (2.0 * STEP) for e in STEP * np.eye(12)]
+    B = [(rates(x, u + e) - rates(x, u - e)) / (2.0 * STEP) for e in STEP * np.eye(4)]
+    return np.array(A).T, np.array(B).T
+
+
+def equations(vehicle: Vehicle) -> list[str]:
+    """`hover_model` as text, one equation per state that has any term.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Sound rotors.
+
+    Returns
+    -------
+    list of str
+        Indented by two spaces, within 100 columns; the last line is the lag of the rotors.
+    """
+    A, B = hover_model(vehicle)
+    lines = []
+    for name, row in zip(STATES, np.hstack([A, B]), strict=True):
+        terms = [f"{value:+.5g} {of}" for value, of in zip(row, (*STATES, *INPUTS), strict=True) if abs(value) > 1e-7]
+        if terms:
+            text = " ".join(terms).removeprefix("+").replace("+", "+ ").replace(" -", " - ").replace("e+ ", "e+")
+            lines.append(f"  d {name}/dt = {text}")
+    lines.append(
+        f"  each thrust follows its command with {vehicle.rotor_bandwidth:g} rad/s, gain {vehicle.rotor_gain:g}"
+    )
+    return lines
+
+
+# -------------------------------------------------------------------------------------------------- the closed loop
 
 
 def calm(
     loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False
 ) -> tuple[ClosedLoop, LoopParameters]:
-    """The same loop without wind and faults; without diagnosis and with nominal allocation unless `keep_belief`.
+    """The same loop with the parts that its slots call calm: no wind, no faults, no ground.
 
-    An observer acts on the motion through its decision alone, and a belief that changes by jumps has no derivative.
+    Without diagnosis, landing and reallocation too, unless `keep_belief`: an observer acts on the motion through its
+    decision alone, and a belief that changes by jumps has no derivative.
     """
-    plant = Plant(loop.plant.model, NoWind(NoWind.Settings()), (), loop.plant.substeps)
-    parameters = parameters._replace(
-        plant=parameters.plant._replace(wind=plant.wind.parameters(), faults=()), period=float(parameters.period)
-    )
-    # A copy, for trial steps must not change a controller that keeps state of its own.
-    autopilot = copy.deepcopy(loop.autopilot)
-    if keep_belief:
-        return ClosedLoop(plant, loop.sensors, autopilot), parameters
-    off, nominal = DIAGNOSES["off"], ALLOCATORS["nominal"]
-    diagnoser = off(off.Settings())
-    autopilot = Autopilot(diagnoser, autopilot.controller, nominal(settings_class(nominal)()))
-    belief = parameters.autopilot._replace(
-        diagnosis=diagnoser.parameters(parameters.autopilot.vehicle, parameters.period)
-    )
-    return ClosedLoop(plant, loop.sensors, autopilot), parameters._replace(autopilot=belief)
+    period = float(parameters.period)
+    contexts = {"truth": Context(parameters.vehicle, period), "belief": Context(parameters.belief, period)}
+    parts: dict[Slot[Any], Any] = {}
+    numbers = []
+    for slot, part in loop.parts.items():
+        if slot.calm is None or (keep_belief and slot.side == "belief"):
+            # A copy, for trial steps must not change a part that keeps state of its own.
+            parts[slot] = copy.deepcopy(part)
+            numbers.append(getattr(parameters.parts, slot.name))
+        elif slot.calm:
+            kind = slot.registry[slot.calm]
+            parts[slot] = kind(kind.Settings())
+            numbers.append(parts[slot].parameters(contexts[slot.side]))
+        elif slot.many:
+            parts[slot] = ()
+            numbers.append(())
+    still = ClosedLoop(parts, loop.plant.substeps)
+    return still, parameters._replace(period=period, parts=still.record(*numbers))
 
 
 def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = False) -> LinearLoop:
@@ -194,12 +273,11 @@ class _Flight:
 
     def __init__(self, loop: ClosedLoop, parameters: LoopParameters) -> None:
         self.loop, self.parameters, self.period = loop, parameters, float(parameters.period)
-        self.vehicle: Vehicle = parameters.plant.vehicle
+        self.vehicle: Vehicle = parameters.vehicle
         # A controller may be written for floats only; else all columns go through one step.
-        self.one_by_one = bool(getattr(loop.autopilot.controller, "python_only", True))
-        zero = zeros()
-        self.drive: Drive = quiet(Reference(zero, zero, zero, 0.0, 0.0, 0.0))
-        self.template: LoopState = loop.initial(level_start(zero), self.drive, parameters)
+        self.one_by_one = any(part.python_only for _, part in loop.each())
+        self.drive: Drive = loop.drive()
+        self.template: LoopState = loop.initial(loop.level_start(zeros()), self.drive, parameters)
         self.start: Array = np.array([[float(leaf)] for leaf in flatten(self.template)])
 
     def advance(self, X: Array, added: Array | None = None) -> tuple[Array, Array]:
@@ -223,16 +301,18 @@ class _Flight:
 
     def _step(self, leaves: list[Scalar], added: list[Scalar] | None) -> tuple[list[Scalar], list[Scalar]]:
         state = unflatten(self.template, leaves)
-        after, signals = self.loop.step(state, self.drive, self.parameters)
+        after, _ = self.loop.step(state, self.drive, self.parameters)
         k = self.vehicle.rotor_gain
         if added is not None:
             extra = nominal_inverse(self.vehicle, Wrench(added[0], Vec3.of(added[1:]))) / k
-            command = Command(signals.thrust_command + extra, after.autopilot.direct_acceleration_W)
-            time = state.steps * self.period
+            sent = after.autopilot.past.command
+            command = Command(sent.thrust + extra, sent.direct_acceleration_W)
+            plant_numbers = self.loop.plant_numbers(self.parameters)
+            held, time = self.loop.held(after), state.steps * self.period
             after = after._replace(
-                plant=self.loop.plant.step(state.plant, command, time, self.parameters.plant, self.period)
+                plant=self.loop.plant.step(state.plant, command, held, time, plant_numbers, self.period)
             )
-        return flatten(after), flatten(wrench_of(self.vehicle, signals.thrust_command * k))
+        return flatten(after), flatten(wrench_of(self.vehicle, after.autopilot.past.command.thrust * k))
 
 
 def _scale(x: Array) -> Array:

@@ -22,7 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from rotorfault.analysis.linearisation import AXES, Array, Complex, LinearLoop
+from rotorfault.analysis.linearisation import AXES, LinearLoop
+from rotorfault.maths.arrays import Array, Complex
 
 # Loop gains outside this range are not looked at: margins beyond it mean nothing, and there rounding rules.
 LOOP_GAIN_RANGE = (1e-5, 1e5)

@@ -21,13 +21,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.analysis.linearisation import Complex
 from rotorfault.autopilot.allocation.available import thrust_available
-from rotorfault.autopilot.control.protocol import ControlInputs, ControlOutput, Prediction
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.autopilot.control.protocol import CONTROLLER, ControlInputs, ControlOutput
+from rotorfault.autopilot.prediction import Prediction
+from rotorfault.maths.arrays import ANGLES, Complex
+from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, unflatten
-from rotorfault.model.signals import Measurement, Reference
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.maths.rotation import Quat
+from rotorfault.model.block import Context
+from rotorfault.model.signals import Estimate, Reference, at_rest, healthy
+from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.reference import REFERENCE
 from rotorfault.scenario.scenario import Scenario
 
 LEAST_DAMPING = 0.1
@@ -98,28 +102,40 @@ def warning(gains: AxisGains, period: float, rotor_bandwidth: float, where: str)
 
 
 def reported_gains(
-    controller: Any, vehicle: Vehicle, period: float, measurement: Measurement, reference: Reference
+    controller: Any, vehicle: Vehicle, period: float, estimate: Estimate, reference: Reference
 ) -> tuple[AxisGains, ...]:
     """Gains that a controller reports at its first step; an axis without any is left out.
 
     Of the attitude's gain matrices the diagonals are taken.
     """
 
-    def first_step(seen: Measurement) -> ControlOutput:
-        numbers = controller.parameters(vehicle, period)
-        memory = controller.initial(seen, reference, numbers)
+    def first_step(seen: Estimate) -> tuple[ControlOutput, Any]:
+        numbers = controller.parameters(Context(vehicle, period))
+        sound, hover = healthy(), hover_thrust(vehicle)
         inputs = ControlInputs(
-            seen, reference, vehicle, Prediction(zeros(), zeros()), 0.0, thrust_available(vehicle, PerRotor.all(0.0))
+            estimate=seen,
+            reference=reference,
+            vehicle=vehicle,
+            diagnosis=sound,
+            command=hover / vehicle.rotor_gain,
+            expected_thrust=hover,
+            prediction=Prediction(zeros(), zeros()),
+            residual_speed=0.0,
+            thrust_available=thrust_available(vehicle, sound.loss),
         )
-        output: ControlOutput = controller.step(memory, inputs, numbers, period)[1]
-        return output
+        output: ControlOutput
+        _, output, telemetry = controller.step(controller.initial(inputs, numbers), inputs, numbers, period)
+        return output, telemetry
 
-    told = first_step(measurement).telemetry
+    signals = first_step(estimate)[1]
+    if not all(hasattr(signals, name) for name in ("gain_position", "gain_velocity", "gain_angle", "gain_rate")):
+        return ()
     # Displaced sideways, only a controller with direct inputs commands an acceleration without rotors.
-    direct = first_step(measurement._replace(p_W=reference.p_W + Vec3(0.1, 0.1, 0.0))).direct_acceleration_W
+    aside = estimate._replace(p_W=reference.p_W + Vec3(0.1, 0.1, 0.0))
+    direct = first_step(aside)[0].direct_acceleration_W
     rows = [
-        *zip("xyz", told.gain_position, told.gain_velocity, direct, strict=True),
-        *zip(("roll", "pitch", "yaw"), told.gain_angle.diag, told.gain_rate.diag, zeros(), strict=True),
+        *zip("xyz", signals.gain_position, signals.gain_velocity, direct, strict=True),
+        *zip(ANGLES, signals.gain_angle.diag, signals.gain_rate.diag, zeros(), strict=True),
     ]
     return tuple(AxisGains(axis, k1, k2, d != 0.0) for axis, k1, k2, d in rows if (k1, k2) != (0.0, 0.0))
 
@@ -128,7 +144,7 @@ def sampled_data_check(
     controller: Any,
     vehicle: Vehicle,
     period: float,
-    measurement: Measurement | None = None,
+    estimate: Estimate | None = None,
     reference: Reference | None = None,
 ) -> list[str]:
     """Warn where a controller's nominal loop is too fast for the sampling period or the rotors.
@@ -141,7 +157,7 @@ def sampled_data_check(
     vehicle : Vehicle
         As the autopilot believes it to be; its `rotor_bandwidth` is the lag.
     period : float, s
-    measurement, reference : optional
+    estimate, reference : optional
         Start of a flight, checked besides the hover at the target.
 
     Returns
@@ -153,9 +169,9 @@ def sampled_data_check(
         return []
     zero = zeros()
     target = Reference(zero, zero, zero, 0.0, 0.0, 0.0)
-    places = [("at the target", Measurement(zero, zero, zero, zero), target)]
-    if measurement is not None:
-        places.append(("at the start", measurement, target if reference is None else reference))
+    places = [("at the target", at_rest(), target)]
+    if estimate is not None:
+        places.append(("at the start", estimate, target if reference is None else reference))
     found: dict[str, str] = {}
     for where, seen, wanted in places:
         try:
@@ -179,12 +195,14 @@ def sampled_data_warnings(scenario: Scenario, controller: Any = None) -> list[st
         Flies in place of the scenario's.
     """
     s = scenario.start
-    start = Measurement(*(Vec3.of(part) for part in (s.position, s.velocity, s.attitude, s.body_rates)))
+    start = Estimate(
+        Vec3.of(s.position), Vec3.of(s.velocity), Quat.from_euler(Vec3.of(s.attitude)), Vec3.of(s.body_rates)
+    )
     with np.errstate(all="ignore"):  # numbers that are not finite are told of by the flight
-        first = scenario.reference.make().table(np.zeros(1)).at(0)
+        first = scenario[REFERENCE].make().table(np.zeros(1)).at(0)
     reference: Reference = unflatten(first, [float(leaf) for leaf in flatten(first)])
     return sampled_data_check(
-        scenario.controller.make() if controller is None else controller,
+        scenario[CONTROLLER].make() if controller is None else controller,
         scenario.vehicle.vehicle,
         scenario.period,
         start,

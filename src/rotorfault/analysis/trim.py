@@ -14,28 +14,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
-from rotorfault.analysis.hover_model import equations
-from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, linearise
+from rotorfault.analysis.hover import Attainable, attainable, attainable_lines
+from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
-from rotorfault.autopilot.allocation import ALLOCATORS
-from rotorfault.autopilot.allocation.protocol import settings_class
-from rotorfault.autopilot.autopilot import Autopilot
-from rotorfault.autopilot.control import CONTROLLERS
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.cascade import attitude_for
-from rotorfault.autopilot.diagnosis import DIAGNOSES
-from rotorfault.autopilot.presets import preset as preset_settings
-from rotorfault.base.config import validate
+from rotorfault.autopilot.control.protocol import Controller
+from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.errors import InputError
+from rotorfault.base.foreign import is_place
+from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
+from rotorfault.maths.arrays import ANGLES
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.signals import Wrench
+from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
-from rotorfault.plant import PLANTS, SENSORS, WINDS
-from rotorfault.plant.plant import Plant
+from rotorfault.scenario.part import part_from
+from rotorfault.scenario.scenario import substeps_of
+from rotorfault.scenario.slots import SLOTS
 
 __all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings", "trim_report"]
 
@@ -97,7 +97,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         thrust=thrust,
         command=thrust / k,
         rotor_speed=rotor_speeds(vehicle, thrust),
-        attitude=attitude_for(force_W, 0.0, 0.0),
+        attitude=attitude_for(force_W, 1.0, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
         thrust_margin=4.0 * k * vehicle.thrust_max / needed,
         torque_max=Vec3.of(_most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
@@ -115,34 +115,33 @@ def _most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:
 
 
 def hover_loop(
-    vehicle: Vehicle, controller: Any, period: float, plant: str = "rigid_body"
+    vehicle: Vehicle, controller: Controller[Any, Any], period: float, plant: str = "rigid_body"
 ) -> tuple[ClosedLoop, LoopParameters]:
-    """A closed loop in still air with sound rotors, ideal sensors, no diagnosis and nominal allocation.
+    """A closed loop in which every slot has its calm or its default part: still air, sound rotors, ideal sensors.
 
     Parameters
     ----------
     vehicle : Vehicle
         Truth and belief.
     controller : Controller
+        That closes the loop.
     period : float, s
+        Sampling period.
     plant : str
         Name of the model of the body.
     """
-    off, nominal, ideal, none = DIAGNOSES["off"], ALLOCATORS["nominal"], SENSORS["ideal"], WINDS["none"]
-    body = Plant(PLANTS[plant](), _default(none), (), max(1, round(period / 0.001)))
-    sensors = _default(ideal)
-    autopilot = Autopilot(off(off.Settings()), controller, nominal(settings_class(nominal)()))
-    loop = ClosedLoop(body, sensors, autopilot)
-    return loop, LoopParameters(
-        plant=body.parameters(vehicle),
-        autopilot=autopilot.parameters(vehicle, period),
-        sensors=sensors.parameters(),
-        period=period,
-    )
-
-
-def _default(part: Any) -> Any:
-    return part(part.Settings())
+    parts: dict[Slot[Any], Any] = {}
+    for slot in SLOTS:
+        name = plant if slot.name == "plant" else slot.default if slot.calm is None else slot.calm
+        if slot is CONTROLLER:
+            parts[slot] = controller
+        elif slot.many:
+            parts[slot] = ()
+        elif slot.side != "task" and name:
+            kind = slot.registry[name]
+            parts[slot] = kind(kind.Settings())
+    loop = ClosedLoop(parts, substeps_of(period))
+    return loop, LoopParameters(vehicle, vehicle, loop.numbers(vehicle, vehicle, period), period)
 
 
 def trim_report(
@@ -157,8 +156,8 @@ def trim_report(
     Parameters
     ----------
     vehicle : Vehicle, VehicleFile, or name or path of a vehicle file
-    controller : str or Controller
-        Name of a registered controller, or one that is made already.
+    controller : str or object
+        Name of a registered controller, a place in code (``FILE.py:NAME``), or one that is made already.
     preset : str, optional
         Preset of a registered controller; its own default if not given.
     period : float, s
@@ -180,12 +179,12 @@ def trim_report(
         vehicle = load_vehicle(vehicle)
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
     if isinstance(controller, str):
-        kind = CONTROLLERS[controller]
-        given = preset_settings(controller, {} if preset is None else {"preset": preset})
-        made, name = kind(validate(kind.Settings, given, controller)), controller
-        name += "" if preset is None else f" ({preset})"
+        table = {"kind": controller} | ({} if preset is None else {"preset": preset})
+        # Whoever names code here wants it run.
+        part = part_from(CONTROLLER, table, (controller,) if is_place(controller) else False)
+        made, name = part.make(), controller + ("" if preset is None else f" ({preset})")
     else:
-        made, name = controller, type(controller).__name__
+        made, name = as_controller(controller), type(controller).__name__
     warnings = sampled_data_check(made, numbers, period)
     linear, found = None, {}
     try:
@@ -233,11 +232,17 @@ def _hover_lines(report: TrimReport) -> list[str]:
         f"Trim of '{report.vehicle}' with {report.controller}, sampled every {report.period:g} s",
         "",
         "Hover",
-        f"  thrust of a rotor       {h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})",
-        f"  speed of a rotor        {speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)",
-        f"  thrust to weight        {h.thrust_margin:.3g}",
-        f"  torque in reserve       {torque} N m about roll, pitch, yaw ({turn} rad/s^2)",
-        f"  rotor lag               {v.rotor_bandwidth:g} rad/s",
+        *table_lines(
+            [
+                ("thrust of a rotor", f"{h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})"),
+                ("speed of a rotor", f"{speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)"),
+                ("thrust to weight", f"{h.thrust_margin:.3g}"),
+                ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
+                ("rotor lag", f"{v.rotor_bandwidth:g} rad/s"),
+            ],
+            "<<",
+            indent=2,
+        ),
     ]
 
 
@@ -245,29 +250,26 @@ def _pole_lines(report: TrimReport) -> list[str]:
     if report.linear is None:
         return ["Closed-loop poles: none, the loop has no linearisation"]
     count, left = len(report.linear.names), len(report.linear.left_out)
-    rows = [
-        f"  {_complex(s):>22}  {abs(s):9.4g}  {-s.real / max(abs(s), 1e-300):7.3f}  {many:5d}  {motion}"
-        for s, many, motion in _distinct(report.linear)
-    ]
+    rows = [("pole [rad/s]", "|s| rad/s", "damping", "times", "motion")]
+    for s, times, motion in _distinct(report.linear):
+        rows.append((_complex(s), f"{abs(s):.4g}", f"{-s.real / max(abs(s), 1e-300):.3f}", str(times), motion))
     return [
         f"Closed-loop poles in hover, log(z)/T ({count} states; {left} that do not act on the motion left out)",
-        f"  {'pole [rad/s]':>22}  {'|s| rad/s':>9}  {'damping':>7}  {'times':>5}  motion",
-        *rows,
+        *table_lines(rows, ">>>><", indent=2),
     ]
 
 
 def _margin_lines(report: TrimReport) -> list[str]:
     if report.linear is None or not report.linear.stable:
         return ["Margins: none, for want of a loop that is stable in hover"]
-    lines = [
-        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
-        f"  axis    {'gain up':>16}  {'gain down':>17}  {'delay [ms]':>10}  {'phase [deg]':>11}  {'at rad/s':>10}",
-    ]
+    rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
     for axis, m in report.margins.items():
         up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
-        numbers = f"{1e3 * m.delay:10.3g}  {math.degrees(m.phase):11.3g}  {m.crossover:10.3g}"
-        lines.append(f"  {axis:6}  {up:>16}  {down:>17}  {numbers}")
-    return lines
+        rows.append((axis, up, down, f"{1e3 * m.delay:.3g}", f"{math.degrees(m.phase):.3g}", f"{m.crossover:.3g}"))
+    return [
+        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
+        *table_lines(rows, "<>>>>>", indent=2),
+    ]
 
 
 def _warning_lines(report: TrimReport) -> list[str]:
@@ -284,7 +286,6 @@ def _complex(s: complex) -> str:
 
 # Translation along x goes through pitch, along y through roll.
 _MOTION = {"p_W": ("pitch", "roll", "thrust"), "v_W": ("pitch", "roll", "thrust")}
-_TURN = ("roll", "pitch", "yaw")
 
 
 def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
@@ -294,7 +295,7 @@ def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
     for name, row in zip(linear.names, np.abs(vectors), strict=True):
         field, component = name.split(".")[-2:]
         if name.startswith("plant.body.") and component in "xyz":
-            motion[AXES.index(_MOTION.get(field, _TURN)["xyz".index(component)])] += row
+            motion[AXES.index(_MOTION.get(field, ANGLES)["xyz".index(component)])] += row
     with np.errstate(divide="ignore", invalid="ignore"):
         s = np.log(z.astype(complex)) / linear.period
     # Computed, a double real pole is a close complex pair.

@@ -131,7 +131,10 @@ class Autopilot:
             For a source of diagnosis that is an oracle, and for nobody else.
         """
         instant = Instant(readings, reference, vehicle, memory.past, dt)
-        memories, telemetry, wrench = [], {}, None
+        memories: list[Any] = []
+        telemetry: dict[str, Record] = {}
+        wrench: Wrench | None = None
+        output: Any
         for slot, part in self.parts.items():
             before, numbers = getattr(memory.parts, slot.name), getattr(parameters, slot.name)
             if slot.name == "allocation" and isinstance(instant.demand, PerRotor):

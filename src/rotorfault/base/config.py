@@ -123,7 +123,7 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
     ----------
     model : type of pydantic.BaseModel
     data : dict
-        As `read_toml` returns it.
+        As `parse_toml` returns it.
     where : str
         The file, for messages.
     context : dict, optional
@@ -138,18 +138,6 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
         return model.model_validate(data, context=context)
     except ValidationError as error:
         raise InputError(explain(error, where)) from None
-
-
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, unreadable, not UTF-8 or not TOML; the message names the file and, for a syntax
-        error, line and column.
-    """
-    return parse_toml(read_text(path), str(path))
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -21,20 +21,19 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from rotorfault.base.progress import Say
 from rotorfault.engine import load_engine
-from rotorfault.engine.batch import Array, Batch, Recording, no_watch
+from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.engine.taylor import fly_taylor
 from rotorfault.flight.assembly import assemble, initial_state, start_of
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import leaf_names
-from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.scenario.scenario import Scenario, scenario_from
-
-Say = Callable[[str], None]
 
 DURATION = 10.0  # s
 PERIOD = 0.01  # s, the sampling period of the second curve
@@ -52,7 +51,7 @@ FLIGHTS: dict[str, list[dict[str, Any]]] = {
         {"kind": "step", "rotor": 3, "time": 1.8, "loss": 0.35},
     ],
 }
-_POSITION = tuple(row for row, name in enumerate(SIGNAL_NAMES) if name.startswith("position."))
+_POSITION = (0, 1, 2)  # rows of the true position: the first signal of every loop
 
 
 class Effort(NamedTuple):

@@ -15,22 +15,22 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from rotorfault.base.progress import Say
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Batch, no_watch
-from rotorfault.flight.flight import fly
+from rotorfault.flight.assembly import assemble_group
+from rotorfault.flight.fly import fly
 from rotorfault.flight.many import fly_many
-from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
-from rotorfault.scenario.scenario import Scenario, load_scenario
+from rotorfault.flight.sweep import checked_columns, groups_of
+from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.scenario import Scenario
 
 SIZES = (100, 1_000, 10_000)
 PERIOD = 1e-3  # s, of sampling and integration
-
-Say = Callable[[str], None]
 
 
 def scenario(duration: float, **settings: Any) -> Scenario:

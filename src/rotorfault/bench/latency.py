@@ -1,4 +1,4 @@
-"""Latency of one control update, from a measurement to rotor commands, on each engine.
+"""Latency of one control update, from readings to rotor commands, on each engine.
 
 The whole autopilot: diagnosis, decision, response, ROISMC with its Riccati step, allocation. Compiled code is called
 from Python with its arrays in place; most of that time is the call.
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from rotorfault.bench.flights import scenario
-from rotorfault.engine.batch import Batch, columns, no_reference
+from rotorfault.engine.batch import Batch, columns
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.engine.machine import aligned, grouped
 from rotorfault.engine.native import lanes
 from rotorfault.flight.assembly import assemble
-from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import flatten, unflatten
+from rotorfault.plant.sensors import SensorInputs
 
 
 def measure(quick: bool = False) -> dict[str, Any]:
@@ -57,11 +57,15 @@ def _latency(update: Callable[[], object], calls: int) -> dict[str, float]:
 
 
 def _instant(batch: Batch) -> tuple[Any, ...]:
-    """Memory, measurement, reference, true loss and parameters of the autopilot at the first sampling instant."""
-    loop, state = batch.loop, batch.state
-    truth = loop.plant.observe(state.plant, 0.0, batch.parameters.plant)
-    reference = unflatten(no_reference(), batch.reference[0].tolist())
-    return state.autopilot, truth.measurement, reference, PerRotor.all(0.0), batch.parameters.autopilot
+    """Memory, readings, reference, believed vehicle and numbers of the autopilot at the first sampling instant."""
+    loop, state, numbers = batch.loop, batch.state, batch.parameters
+    held = loop.held(state)
+    air = loop.plant.wind.at(0.0, held.wind, numbers.parts.wind)
+    truth = loop.plant.observe(state.plant, held, air, 0.0, loop.plant_numbers(numbers))
+    inputs = SensorInputs(0.0, truth.state, truth.specific_force_B)
+    readings = loop.sensors.step(state.truth.sensors, inputs, numbers.parts.sensors, numbers.period)[1]
+    reference = unflatten(loop.drive(), batch.reference[0].tolist()).reference
+    return state.autopilot, readings, reference, numbers.belief, numbers.parts
 
 
 def _floats(batch: Batch) -> Callable[[], object]:

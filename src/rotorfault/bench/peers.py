@@ -14,19 +14,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.progress import Say
 
 SCRIPTS: Final = Path(__file__).parent / "peer_scripts"
 STAMP: Final = "complete.json"
 PATIENCE: Final = 3600.0  # s, after which a script has hung
 # Numerical libraries ask each its own variable how many threads they may start.
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-Say = Callable[[str], None]
 
 
 class Peer(NamedTuple):

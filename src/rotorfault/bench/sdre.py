@@ -18,7 +18,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag, solve_continuous_are
 
 from rotorfault.autopilot.control.riccati import AttitudeProblem, Gain, attitude_problem, fly, guaranteed_gain
@@ -31,17 +30,16 @@ from rotorfault.autopilot.control.sdre import (
     position_gains,
     sdre_parameters,
 )
-from rotorfault.autopilot.presets import preset
+from rotorfault.autopilot.presets import presets
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.engine.machine import grouped
 from rotorfault.engine.native import lanes
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
-
-Matrix = npt.NDArray[np.float64]
 
 RATE_MAX = 20.0  # rad/s
 RESIDUAL_SPEED_MAX = 500.0  # rad/s
@@ -68,11 +66,11 @@ class Case(NamedTuple):
 
 
 class _Dense(NamedTuple):
-    A: Matrix
-    B: Matrix
-    Q: Matrix
-    R: Matrix
-    G: Matrix  # B R^-1 B^T, which SLICOT wants
+    A: Array
+    B: Array
+    Q: Array
+    R: Array
+    G: Array  # B R^-1 B^T, which SLICOT wants
 
 
 def measure(quick: bool = False) -> dict[str, Any]:
@@ -132,7 +130,7 @@ def _solve_whole(case: Case, steps: int) -> tuple[Gain, Scalar, Scalar, Vec3, Ve
 
 def _cases(count: int) -> list[Case]:
     vehicle = load_vehicle("paper").vehicle
-    weights = sdre_parameters(Weights(**preset("sdre", {"preset": "tuned"})["law"]))
+    weights = sdre_parameters(Weights(**presets("sdre")["tuned"]["law"]))
     rng = np.random.default_rng(1)
     cases = []
     for _ in range(count):
@@ -203,7 +201,7 @@ def _in_flight(cases: list[Case], batch: int, repeats: int) -> float:
     return _microseconds(lambda: compiled.evaluate(groups, out), batch, 20 * repeats)
 
 
-def _rows(records: Sequence[Any], count: int | None = None) -> Matrix:
+def _rows(records: Sequence[Any], count: int | None = None) -> Array:
     """Records as columns of a contiguous array, repeated up to `count` columns."""
     columns = np.array([flatten(record) for record in records]).T
     return np.ascontiguousarray(columns[:, np.arange(count or len(records)) % len(records)])
@@ -224,7 +222,7 @@ def _dense(size: int, case: Case) -> _Dense:
     return _Dense(A, B, Q, R, B @ np.linalg.solve(R, B.T))
 
 
-def _cost(case: Case, found: Any, dense: _Dense) -> Matrix:
+def _cost(case: Case, found: Any, dense: _Dense) -> Array:
     """P of a solution, whose gains are R^-1 B^T P."""
     P = cost_matrix(_attitude(case), found[0])
     if len(found) > 3:
@@ -234,7 +232,7 @@ def _cost(case: Case, found: Any, dense: _Dense) -> Matrix:
     return np.asarray(P, dtype=np.float64)
 
 
-def _worst_residual(dense: list[_Dense], costs: list[Matrix]) -> float:
+def _worst_residual(dense: list[_Dense], costs: list[Array]) -> float:
     return max(
         float(np.linalg.norm(A.T @ P + P @ A - P @ G @ P + Q) / np.linalg.norm(Q))
         for (A, _, Q, _, G), P in zip(dense, costs, strict=True)

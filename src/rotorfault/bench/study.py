@@ -7,19 +7,20 @@ import importlib.util
 import json
 import os
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rotorfault._version import __version__
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import write_atomically
+from rotorfault.base.progress import Say
+from rotorfault.base.text_table import table_lines
 from rotorfault.bench import flights, latency, peers
 from rotorfault.bench.peak import peak_flops
 from rotorfault.engine import have_simd
 from rotorfault.engine.machine import Machines
 
-Say = Callable[[str], None]
 FLOPS = {"fma": 2, "fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1}
 """Floating-point operations of an instruction; comparisons, selections and bit operations count as none."""
 IDLE = "none"  # sort of instructions that only name places
@@ -133,15 +134,8 @@ def _machine(found: dict[str, Any]) -> str:
 
 
 def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
-    lines = [
-        "  ".join(
-            cell.ljust(w) if k == 0 else cell.rjust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in [head, *rows]
-    ]
-    lines.insert(1, "  ".join("-" * w for w in widths))
-    return "\n".join(line.rstrip() for line in lines)
+    """Numbers below their heads, names on the left."""
+    return "\n".join(table_lines([head, *rows], "<" + ">" * (len(head) - 1), rule=True))
 
 
 def _flights(found: dict[str, Any]) -> str:

@@ -13,7 +13,8 @@ from rotorfault.campaigns.sampling.axes import columns
 from rotorfault.campaigns.sampling.plan import Flights, drawn, identifier, seeds
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.many import fly_many
-from rotorfault.results.metrics import SURVIVED as IN_ONE_PIECE
+from rotorfault.loop.scores import SURVIVED as IN_ONE_PIECE
+from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import ScoreTable
 
 RECOVERED = 0.25  # m: within it a vehicle counts as back where it should be
@@ -63,7 +64,7 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
         given: dict[str, Any] = dict(columns(vary(study, mine)))
         given["seed"] = seeds(study, mine)
         parts.append((which, fly_many(scenario, given, within=RECOVERED, threads=threads).table))
-        heights[which] = scenario.reference.make().table(np.zeros(1)).p_W[0, 2]
+        heights[which] = scenario[REFERENCE].make().table(np.zeros(1)).p_W[0, 2]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
     found: dict[str, Any] = {

@@ -9,7 +9,8 @@ from rotorfault.campaigns.block import vary
 from rotorfault.campaigns.sampling.axes import columns
 from rotorfault.campaigns.sampling.plan import Flights, identified, seeds
 from rotorfault.campaigns.study import Study
-from rotorfault.flight.flight import Flight, fly
+from rotorfault.flight.flight import Flight
+from rotorfault.flight.fly import fly
 
 
 def settings_of(study: Study, flight: Flights) -> dict[str, Any]:

@@ -25,7 +25,8 @@ from rotorfault.campaigns.sampling.axes import columns
 from rotorfault.campaigns.sampling.plan import Counts, Flights, blocks, next_round
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study
-from rotorfault.flight.sweep import assemble_group, checked_columns, groups_of
+from rotorfault.flight.assembly import assemble_group
+from rotorfault.flight.sweep import checked_columns, groups_of
 
 BYTES_PER_FLIGHT = 400
 Say = Callable[[str], None]

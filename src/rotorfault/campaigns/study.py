@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
-from rotorfault.base.errors import InputError
-from rotorfault.base.errors import unknown
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.grades import GRADES, SURVIVED
 from rotorfault.campaigns.sampling.axes import AXES, axis
 from rotorfault.campaigns.sampling.refine import Refinement, looks
 from rotorfault.campaigns.studies import FOLDER, study_names
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.scenario import Scenario, load_scenario, override_all, scenario_from
+from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000

@@ -2,55 +2,39 @@
 
 from __future__ import annotations
 
-import importlib
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
-from rotorfault.autopilot.allocation import ALLOCATORS
-from rotorfault.autopilot.control import CONTROLLERS, RESPONSES
-from rotorfault.autopilot.diagnosis import DIAGNOSES
-from rotorfault.autopilot.presets import presets
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.config import parse_toml, read_text
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import output_folder, write_atomically
-from rotorfault.base.registry import Registry
-from rotorfault.base.errors import unknown
+from rotorfault.base.text_table import table_lines
 from rotorfault.campaigns.studies import study_names
 from rotorfault.engine import ENGINES
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
-from rotorfault.plant import FAULTS, PLANTS, SENSORS, WINDS
-from rotorfault.reference.sources import REFERENCES
-from rotorfault.scenario.scenario import load_scenario, new_scenario, scenario_from, scenario_names
-
-REGISTRIES: dict[str, Registry[Any]] = {
-    "controllers": CONTROLLERS,
-    "plants": PLANTS,
-    "references": REFERENCES,
-    "winds": WINDS,
-    "faults": FAULTS,
-    "sensors": SENSORS,
-    "diagnoses": DIAGNOSES,
-    "allocators": ALLOCATORS,
-    "responses": RESPONSES,
-}
+from rotorfault.plant import FAULT, PLANT
+from rotorfault.reference import REFERENCE
+from rotorfault.scenario.library import load_scenario, new_scenario, scenario_names
+from rotorfault.scenario.scenario import scenario_from
+from rotorfault.scenario.slots import SLOTS
 
 
 def entries() -> dict[str, dict[str, str]]:
     """One line about each thing, by group and name."""
-    found: dict[str, dict[str, str]] = {
+    groups: dict[str, dict[str, str]] = {
         "scenarios": {name: _description("rotorfault.scenario.builtin", name) for name in scenario_names()},
         "vehicles": {name: _description("rotorfault.model.vehicles", name) for name in vehicle_names()},
     }
-    for group, registry in REGISTRIES.items():
-        found[group] = {name: registry.summary(name) for name in registry}
-    for name in found["controllers"]:
-        known = presets(name)
-        found["controllers"][name] += f" Presets: {', '.join(known)}." if known else ""
-    found["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
-    found["engines"] = {name: about for name, (_, about) in ENGINES.items()}
-    return found
+    for slot in SLOTS:
+        groups[slot.group] = {name: slot.registry.summary(name) for name in slot.registry}
+        for name in groups[slot.group] if slot.presets is not None else ():
+            known = slot.presets(name) if slot.presets is not None else {}
+            groups[slot.group][name] += f" Presets: {', '.join(known)}." if known else ""
+    groups["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
+    groups["engines"] = {name: about for name, (_, about) in ENGINES.items()}
+    return groups
 
 
 def _description(package: str, name: str) -> str:
@@ -73,7 +57,7 @@ def text(group: str | None = None) -> str:
     width = max(len(name) for names in shown.values() for name in names)
     blocks = []
     for title, names in shown.items():
-        blocks.append("\n".join([title, *(f"  {name.ljust(width)}  {about}" for name, about in names.items())]))
+        blocks.append("\n".join([title, *table_lines(list(names.items()), "<<", indent=2, least=[width])]))
     return "\n\n".join(blocks)
 
 
@@ -100,8 +84,14 @@ def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
     return path
 
 
-def check(path: Path) -> str:
+def check(path: Path, allow_code: bool = False) -> str:
     """Validate a file; one line about what it holds.
+
+    Parameters
+    ----------
+    path : Path
+    allow_code : bool
+        Whether code that the file names may run.
 
     Raises
     ------
@@ -110,9 +100,10 @@ def check(path: Path) -> str:
     """
     if path.suffix == ".nc":
         # xarray takes longer to load than all the rest, and only flight files need it.
-        dataset = importlib.import_module("rotorfault.results.dataset")
+        from rotorfault.results import dataset
+
         data = dataset.read_netcdf(path)
-        scenario = scenario_from(dataset.configuration(data, path), str(path))
+        scenario = scenario_from(dataset.configuration(data, path), str(path), allow_code)
         return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
     text = read_text(path)
     if path.suffix != ".toml":
@@ -122,9 +113,9 @@ def check(path: Path) -> str:
     if {"mass", "rotor", "inertia_x", "thrust_max"} & set(tables):
         vehicle = load_vehicle(path)
         return f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
-    scenario = load_scenario(path)
-    scenario.reference.make()
+    scenario = load_scenario(path, allow_code=allow_code)
+    scenario[REFERENCE].make()
     return (
-        f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on {scenario.plant} "
-        f"flown by {scenario.controller.kind}, {len(scenario.fault)} fault(s); ok"
+        f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on {scenario[PLANT].kind} "
+        f"flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
     )

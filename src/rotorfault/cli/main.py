@@ -226,7 +226,7 @@ def trim(
 
     Example: rotorfault trim paper --controller smc --loss 1=0.4
     """
-    loss = _load("analysis.attainable").parse_losses(losses or [])
+    loss = _load("cli.losses").parse_losses(losses or [])
     typer.echo(_load("analysis.trim").trim_report(vehicle, controller, preset, period, loss).text())
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.noise import Noise, Stream
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
-from rotorfault.maths.records import flatten, leaf_names, record_type
+from rotorfault.maths.records import flatten, leaf_names
 
 Array = NDArray[np.float64]
 CHUNK = 500  # steps between two looks at progress, noise and flights that are over
@@ -85,9 +85,7 @@ def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:
 
 def drive_template(batch: Batch) -> Drive:
     """A record of the shape that the rows of `drive_rows` flatten."""
-    streams = streams_of(batch)
-    record = record_type("Normals", tuple(streams))
-    return batch.loop.drive()._replace(normals=record(*((0.0,) * stream.width for stream in streams.values())))
+    return batch.loop.drive()
 
 
 def columns(record: Any, count: int, part: slice = slice(None)) -> Array:

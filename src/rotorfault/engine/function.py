@@ -9,11 +9,11 @@ from typing import Any, final
 import numpy as np
 
 from rotorfault.engine import native
-from rotorfault.engine.batch import Array
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.machine import aligned, grouped, ungrouped
 from rotorfault.engine.trace import Tape
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, unflatten
 
 

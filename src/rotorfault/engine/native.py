@@ -9,9 +9,8 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotorfault.maths.arrays import Array
 
 
 @lru_cache(maxsize=1)

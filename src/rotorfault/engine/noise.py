@@ -19,7 +19,8 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotorfault.maths.arrays import Array
+
 Words = NDArray[np.uint64]
 
 ROTATIONS = (16, 42, 12, 31, 16, 32, 24, 21)

@@ -17,8 +17,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.batch import CHUNK, Array, Batch, Recording, Records, Watch, columns, ends_of, no_watch
+from rotorfault.engine.batch import CHUNK, Batch, Recording, Records, Watch, columns, ends_of, no_watch
 from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
+from rotorfault.maths.arrays import Array
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
 PATIENCE = 0.1  # s between two looks at progress

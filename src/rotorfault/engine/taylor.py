@@ -20,12 +20,11 @@ from typing import Any, cast, final
 from rotorfault.base.errors import InputError
 from rotorfault.engine import python
 from rotorfault.engine.batch import Batch, Recording, Watch, no_watch
-from rotorfault.loop.closed_loop import ClosedLoop
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.signals import Command
-from rotorfault.plant.plant import Motion, Plant, PlantParameters, PlantState
+from rotorfault.plant.plant import Held, Plant, PlantParameters, PlantState, Timed
 
 TOLERANCE = 1e-16  # relative to the largest coordinate, in each Taylor step
 
@@ -56,7 +55,7 @@ def fly_taylor(batch: Batch, watch: Watch = no_watch, tolerance: float = TOLERAN
         raise InputError("ground: contact is not smooth, so Taylor series cannot serve; allowed: a flight without it")
     # A wrapped plant, not a second loop: whatever else happens in a sampling period stays as it is.
     wrapped = cast(Plant, _TaylorPlant(plant, batch, tolerance))
-    return python.run(batch._replace(loop=ClosedLoop(wrapped, batch.loop.sensors, batch.loop.autopilot)), watch)
+    return python.run(batch._replace(loop=batch.loop.with_plant(wrapped)), watch)
 
 
 @final
@@ -66,13 +65,17 @@ class _TaylorPlant:
     def __init__(self, plant: Plant, batch: Batch, tolerance: float) -> None:
         self._plant = plant
         hy = _heyoka()
-        state, parameters = batch.state.plant, batch.parameters.plant
+        state, parameters, memory = (
+            batch.state.plant,
+            batch.loop.plant_numbers(batch.parameters),
+            batch.loop.held(batch.state),
+        )
         motion = (state.body, state.rotors)
-        held = (Command(PerRotor.all(0.0), zeros()), plant.fault(0.0, parameters), state.air, parameters)
+        held = (Command(PerRotor.all(0.0), zeros()), plant.fault(0.0, memory, parameters), memory, parameters)
         x = hy.make_vars(*(name.replace(".", "_") for name in leaf_names(motion)))
         body, rotors = unflatten(motion, x)
         numbers = unflatten(held, [hy.par[i] for i in range(len(flatten(held)))])
-        dot = plant.derivative(Motion(hy.time, body, rotors), *numbers)
+        dot = plant.derivative(Timed(hy.time, body, rotors), *numbers)
         right = [hy.expression(e) if isinstance(e, float) else e for e in flatten((dot.body, dot.rotors))]
         self._integrator = hy.taylor_adaptive(list(zip(x, right, strict=True)), [0.0] * len(x), tol=tolerance)
         self._reached = hy.taylor_outcome.time_limit
@@ -81,18 +84,24 @@ class _TaylorPlant:
         return getattr(self._plant, name)
 
     def step(
-        self, state: PlantState, command: Command, time: Scalar, parameters: PlantParameters, period: Scalar
+        self,
+        state: PlantState,
+        command: Command,
+        held: Held,
+        time: Scalar,
+        parameters: PlantParameters,
+        period: Scalar,
     ) -> PlantState:
         """State one sampling period later; see `Plant.step`."""
         plant, taylor = self._plant, self._integrator
-        held = (plant.limited(command, parameters), plant.fault(time, parameters), state.air, parameters)
-        taylor.pars[:] = flatten(held)[: len(taylor.pars)]  # it keeps them up to the last that the motion needs
+        values = (plant.limited(command, parameters), plant.fault(time, held, parameters), held, parameters)
+        taylor.pars[:] = flatten(values)[: len(taylor.pars)]  # it keeps them up to the last that the motion needs
         taylor.state[:] = flatten((state.body, state.rotors))
         taylor.time = time
         if taylor.propagate_for(period)[0] != self._reached:
             raise OverflowError("the motion has no finite numbers")  # a lost flight, for the engine
         body, rotors = unflatten((state.body, state.rotors), taylor.state.tolist())
-        return PlantState(plant.model.after_step(body), rotors, state.air)
+        return PlantState(plant.model.after_step(body), rotors)
 
 
 def _heyoka() -> Any:

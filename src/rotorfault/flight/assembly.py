@@ -164,7 +164,7 @@ def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> A
         If one is not finite.
     """
     source = scenario[REFERENCE].make() if source is None else source
-    times = np.arange(scenario.steps) * scenario.period
+    times: Array = np.arange(scenario.steps, dtype=np.float64) * scenario.period
     with np.errstate(all="ignore"):
         table = source.table(times)
         own = [np.broadcast_to(leaf, times.shape) for leaf in flatten(source.signals(times))]

@@ -13,6 +13,7 @@ import numpy as np
 from rotorfault._version import __version__
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.python_controller import as_controller
+from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_own, source_digest
 from rotorfault.base.progress import Bar
@@ -23,6 +24,7 @@ from rotorfault.flight.assembly import Own, assemble, assemble_all
 from rotorfault.flight.flight import Flight
 from rotorfault.loop.scores import ENDS
 from rotorfault.maths.records import unflatten
+from rotorfault.plant import PLANT
 from rotorfault.results.flight_data import FORMAT, flight_data
 from rotorfault.results.outcome import Outcome, finite_or_none
 from rotorfault.results.score_table import score_table
@@ -204,7 +206,7 @@ def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
     if own is not None:
         source = "" if is_own(type(own).__module__) else source_digest(own)
         parts.append({"slot": CONTROLLER.name, "kind": name, "preset": "", "source": source})
-    decision = getattr(scenario.diagnosis.settings, "decision", None)
+    decision = getattr(scenario[DIAGNOSIS].settings, "decision", None)
     return {
         "format": FORMAT,
         "title": f"{scenario.name} flown by {name}",
@@ -213,7 +215,7 @@ def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
         "preset": controller.preset if own is None else "",
         "own_controller": name if own is not None else "",
         "parts": json.dumps(parts),
-        "plant": scenario.plant.kind,
+        "plant": scenario[PLANT].kind,
         "vehicle": scenario.vehicle.name,
         "engine": engine,
         "seed": scenario.seed,

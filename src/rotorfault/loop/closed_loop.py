@@ -13,6 +13,7 @@ fault at 1.8 s falls on its step exactly.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, cast, final
 
@@ -164,14 +165,38 @@ class ClosedLoop:
             )
         )
 
-    def drive(self) -> Drive:
-        """A drive without normal numbers; its own numbers have no meaning."""
+    def drive(self, reference: Reference | None = None) -> Drive:
+        """A drive without noise, of the shape that all drives of this loop have.
+
+        Parameters
+        ----------
+        reference : Reference, optional
+            The origin, at rest, if not given.
+        """
         own = () if self.reference is Nothing else example(self.reference)
-        return Drive(no_reference(), own=own)
+        widths = {slot.name: part.normals for slot, part in self.each() if part.normals}
+        zeros_of = record_type("Normals", tuple(widths))(*((0.0,) * width for width in widths.values()))
+        return Drive(no_reference() if reference is None else reference, own, zeros_of)
+
+    def level_start(self, p_W: Vec3) -> Start:
+        """At rest and level at a position in m, without noise."""
+        widths = {
+            slot.name: part.normals if part.first_normals is None else part.first_normals
+            for slot, part in self.each()
+            if part.normals or part.first_normals
+        }
+        zeros_of = record_type("FirstNormals", tuple(widths))(*((0.0,) * width for width in widths.values()))
+        return Start(p_W, zeros(), zeros(), zeros(), zeros_of)
+
+    def with_plant(self, plant: Plant) -> ClosedLoop:
+        """The same loop with another integrator of the motion."""
+        loop = copy.copy(self)
+        loop.plant = plant
+        return loop
 
     def initial(self, start: Start, drive: Drive, parameters: LoopParameters) -> LoopState:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
-        numbers, plant_numbers = parameters.parts, self._plant_numbers(parameters)
+        numbers, plant_numbers = parameters.parts, self.plant_numbers(parameters)
         plant = self.plant.initial(
             start.p_W, start.v_W, start.attitude, start.omega_B, hover_thrust(parameters.belief), plant_numbers
         )
@@ -196,7 +221,7 @@ class ClosedLoop:
         after, command, recorded = self.decide(state, drive, parameters)
         time = state.steps * parameters.period
         plant = self.plant.step(
-            after.plant, command, self.held(after), time, self._plant_numbers(parameters), parameters.period
+            after.plant, command, self.held(after), time, self.plant_numbers(parameters), parameters.period
         )
         return after._replace(plant=plant), recorded
 
@@ -215,7 +240,7 @@ class ClosedLoop:
         time, dt, numbers = state.steps * parameters.period, parameters.period, parameters.parts
         telemetry: dict[str, Record] = {"reference": drive.own}
         held, air = self._blown(state, drive, parameters, telemetry)
-        plant_numbers = self._plant_numbers(parameters)
+        plant_numbers = self.plant_numbers(parameters)
         truth = self.plant.observe(state.plant, held, air, time, plant_numbers)
         sensors, readings, telemetry["sensors"] = self.sensors.step(
             state.truth.sensors, _sensed(truth, time, _normals(drive.normals, "sensors")), numbers.sensors, dt
@@ -238,13 +263,13 @@ class ClosedLoop:
 
     def limited(self, command: Command, parameters: LoopParameters) -> Command:
         """The command within the true rotor limits."""
-        return self.plant.limited(command, self._plant_numbers(parameters))
+        return self.plant.limited(command, self.plant_numbers(parameters))
 
     def substep(
         self, state: LoopState, command: Command, time: Scalar, parameters: LoopParameters, dt: Scalar
     ) -> LoopState:
         """State one integration step of dt [s] later, after `decide`, the command (within the limits) held."""
-        numbers = self._plant_numbers(parameters)
+        numbers = self.plant_numbers(parameters)
         return state._replace(plant=self.plant.substep(state.plant, command, self.held(state), time, numbers, dt))
 
     def held(self, state: LoopState) -> Held:
@@ -273,7 +298,7 @@ class ClosedLoop:
         if oracle is None:
             return None
         age = oracle.age(parameters.parts.diagnosis)
-        return self.plant.true_loss(plant, held, time - age, self._plant_numbers(parameters))
+        return self.plant.true_loss(plant, held, time - age, self.plant_numbers(parameters))
 
     def onsets(self, numbers: Any) -> tuple[Scalar, ...]:
         """Time of the first effect of each fault in s."""
@@ -282,7 +307,8 @@ class ClosedLoop:
     def _faults(self, numbers: Any) -> tuple[Any, ...]:
         return cast("tuple[Any, ...]", numbers.fault) if self.plant.faults else ()
 
-    def _plant_numbers(self, parameters: LoopParameters) -> PlantParameters:
+    def plant_numbers(self, parameters: LoopParameters) -> PlantParameters:
+        """The numbers of the truth's parts, as the plant has them."""
         numbers = parameters.parts
         return PlantParameters(
             parameters.vehicle,
@@ -310,8 +336,3 @@ def no_reference() -> Reference:
     """The origin, at rest."""
     zero = zeros()
     return Reference(p_W=zero, v_W=zero, a_W=zero, yaw=0.0, yaw_rate=0.0, yaw_acceleration=0.0)
-
-
-def level_start(p_W: Vec3) -> Start:
-    """At rest and level."""
-    return Start(p_W, zeros(), zeros(), zeros())

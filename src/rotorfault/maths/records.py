@@ -107,4 +107,4 @@ def record_type(name: str, fields: tuple[str, ...]) -> Any:
     fields : tuple of str
         Names of its fields, in order.
     """
-    return namedtuple(name, fields)  # type: ignore[misc]
+    return namedtuple(name, fields)

@@ -67,7 +67,8 @@ class Block(Generic[InputsT, OutputT, MemoryT, ParametersT]):
     slot: ClassVar[Slot[Any] | None] = None  # of the kind; set where the kind is defined
 
     def __init__(self, settings: Any = None) -> None:
-        self.settings = self.Settings() if settings is None else settings
+        # Of the part's own class of settings, which a type parameter more would name at every use.
+        self.settings: Any = self.Settings() if settings is None else settings
 
     def parameters(self, context: Context) -> ParametersT:
         """Numbers as a record; none, unless a part has some.

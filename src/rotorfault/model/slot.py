@@ -47,6 +47,9 @@ class Slot(Generic[B]):
         Words that tell the random numbers of a flight's steps, and of its start, from those of other slots.
     shorthand : callable, optional
         Turns what may stand for a table in a scenario (a bare number, say) into the table; leaves the rest alone.
+    calm : str, optional
+        Part that takes the place of any other where a loop is looked at near hover, such as no wind and no diagnosis;
+        empty for no part at all. Not given: a loop keeps its own.
     presets : callable, optional
         Presets of a part by name, each a table of settings.
     inputs : callable, optional
@@ -67,6 +70,7 @@ class Slot(Generic[B]):
         many: bool = False,
         optional: bool = False,
         streams: tuple[int, int] = (0, 0),
+        calm: str | None = None,
         shorthand: Callable[[Any], Any] | None = None,
         presets: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
         inputs: Callable[[Any], Any] | None = None,
@@ -80,6 +84,7 @@ class Slot(Generic[B]):
         self.many: Final = many
         self.optional: Final = optional
         self.streams: Final = streams
+        self.calm: Final = calm
         self.shorthand: Final = shorthand
         self.presets: Final = presets
         self.inputs: Final = inputs
@@ -110,7 +115,7 @@ def register(name: str) -> Callable[[Part], Part]:
     """
 
     def keep(part: Part) -> Part:
-        slot_of(part).registry.add(name, part)
+        slot_of(part).registry.add(name, part)  # type: ignore[arg-type]  # a class of blocks makes them of settings
         return part
 
     return keep

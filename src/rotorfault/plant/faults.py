@@ -86,6 +86,7 @@ FAULT = Slot(
     "what goes wrong with the rotors, in the order given: [[fault]] tables",
     "faults",
     many=True,
+    calm="",
 )
 
 

@@ -76,6 +76,7 @@ GROUND = Slot(
     "grounds",
     default="level",
     optional=True,
+    calm="",
     shorthand=_level,
 )
 

@@ -35,7 +35,7 @@ class Wind(Timed[Air, MemoryT, ParametersT]):
     """
 
 
-WIND = Slot("wind", Wind, "truth", "what the air does", "winds", default="none", streams=(1, 2))
+WIND = Slot("wind", Wind, "truth", "what the air does", "winds", default="none", streams=(1, 2), calm="none")
 
 
 @final

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicSpline
 
-Array = NDArray[np.float64]
+from rotorfault.maths.arrays import Array
 
 
 @final

@@ -20,6 +20,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import output_folder, write_atomically
+from rotorfault.maths.arrays import ANGLES
 from rotorfault.report.detection_figure import detection_figure
 from rotorfault.report.panels import (
     REFERENCE,
@@ -160,7 +161,7 @@ def _attitude(drawn: Sequence[Drawn]) -> Figure:
     # A vehicle that spins in yaw leaves the panel: the half turn either way is what can be read.
     panels = [
         Panel(name, (solid("attitude", k), dashed("attitude_command", k, 0.7)), 0.05, core=np.pi)
-        for k, name in enumerate(("roll", "pitch", "yaw"))
+        for k, name in enumerate(ANGLES)
     ]
     timeline(figure, panels, drawn)
     legend(figure, drawn, [sample("command", **REFERENCE | {"linewidth": 0.7})])

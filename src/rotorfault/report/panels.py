@@ -20,13 +20,13 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from rotorfault.base.errors import InputError
+from rotorfault.maths.arrays import Array
 from rotorfault.report.style import (
     BLACK,
     COLOURS,
     GREY,
     LIGHT,
     LINES,
-    Array,
     envelope,
     number,
     padded,
@@ -34,7 +34,7 @@ from rotorfault.report.style import (
     span,
     unit,
 )
-from rotorfault.results.metrics import Outcome
+from rotorfault.results.outcome import Outcome
 
 ROOM = 0.98  # share of the width that a legend may take
 REACH = 3.0  # spans by which a panel may exceed its core before it is cut

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
+from rotorfault.maths.arrays import Array
 from rotorfault.report.panels import END, REFERENCE, Drawn, legend, sample
-from rotorfault.report.style import BLACK, GREY, Array, extremes, new_figure, span
+from rotorfault.report.style import BLACK, GREY, extremes, new_figure, span
 
 START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
 FAULT: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 4.5, "markeredgecolor": BLACK}

@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch
 
+from rotorfault.maths.arrays import Array
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.report.panels import sample
-from rotorfault.report.style import BLACK, BLUE, GREY, VERMILION, Array, new_figure
+from rotorfault.report.style import BLACK, BLUE, GREY, VERMILION, new_figure
 
 # By the sign of the yaw torque. Drag turns the body against the rotor, so "+" is a rotor that turns clockwise.
 LOOKS = {

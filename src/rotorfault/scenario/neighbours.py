@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from rotorfault.base.errors import InputError
-from rotorfault.scenario.scenario import Mismatch, Part, Scenario, Start
+from rotorfault.plant import FAULT
+from rotorfault.scenario.scenario import Mismatch, Scenario, Start
 
 
 def neighbour(
@@ -64,9 +65,9 @@ def neighbour(
     # On a sampling instant, as the original's: between two of them it would act from the next sub-step on.
     moment = round(moment / scenario.period) * scenario.period
     faults = tuple(
-        Part(part.registry, part.kind, part.settings.model_copy(update={"time": moment}))
+        part.with_settings(part.settings.model_copy(update={"time": moment}))
         if "time" in type(part.settings).model_fields
         else part
-        for part in scenario.fault
+        for part in scenario.all(FAULT)
     )
     return scenario.model_copy(update={"mismatch": mismatch, "start": start, "fault": faults})

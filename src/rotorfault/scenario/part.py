@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Annotated, Any, Generic, TypeVar, cast, final
 
 from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, ValidationInfo
-from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, passed_on, refusal
@@ -40,7 +40,8 @@ class Part(Generic[B]):
     def __init__(
         self, slot: Slot[B], kind: str, settings: Strict, preset: str = "", factory: Kind[B] | None = None
     ) -> None:
-        self.slot, self.kind, self.settings, self.preset = slot, kind, settings, preset
+        self.slot, self.kind, self.preset = slot, kind, preset
+        self.settings: Any = settings  # of the part's own class
         self._factory = factory
 
     def __repr__(self) -> str:
@@ -128,6 +129,28 @@ def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Pa
         raise refusal("", str(error)) from None
 
 
+def part_from(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
+    """A part from a name, a table or a place in code, outside of any scenario.
+
+    Parameters
+    ----------
+    slot : Slot
+    value : str, mapping or Part
+    allow : bool or collection of str
+        Whether code from outside may run, or which.
+
+    Raises
+    ------
+    InputError
+        If it is not right.
+    """
+    try:
+        return read(slot, value, allow)
+    except PydanticCustomError as error:
+        key = (error.context or {}).get("key", "")
+        raise InputError(": ".join(word for word in (slot.name, key, error.message()) if word)) from None
+
+
 def _foreign(slot: Slot[B], place: str, allow: bool | Collection[str]) -> Kind[B]:
     foreign.require_allowed(place, allow, slot.registry.sort)
     part = foreign.load(place, slot.registry.sort)
@@ -167,7 +190,7 @@ def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]
 
 
 @lru_cache(maxsize=64)
-def field_of(slot: Slot[Any]) -> tuple[Any, FieldInfo]:
+def field_of(slot: Slot[Any]) -> tuple[Any, Any]:
     """Type and description of a scenario's key for a slot."""
 
     def check(value: Any, info: ValidationInfo) -> Any:

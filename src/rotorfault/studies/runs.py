@@ -19,9 +19,11 @@ import xarray as xr
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import write_atomically
 from rotorfault.base.versions import source_digest
-from rotorfault.flight.flight import fly, load
-from rotorfault.results.metrics import finite_or_none
-from rotorfault.scenario.scenario import Scenario, load_scenario
+from rotorfault.flight.flight import load
+from rotorfault.flight.fly import fly
+from rotorfault.results.outcome import finite_or_none
+from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.scenario import Scenario
 
 Measure = Callable[[xr.Dataset], dict[str, Any]]
 

@@ -12,10 +12,15 @@ import cma
 import numpy as np
 
 from rotorfault._version import __version__
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import InputError
 from rotorfault.engine import default_engine, load_engine
-from rotorfault.engine.batch import Array, no_watch
+from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble_all
+from rotorfault.maths.arrays import Array
+from rotorfault.results.flight_data import flight_data
+from rotorfault.results.score_table import score_table
+from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.space import SPACES, settings_at
 from rotorfault.tuning.training import objective, training_groups
@@ -106,17 +111,17 @@ def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[li
     """Mean objective of each candidate; the groups count alike."""
     total = np.zeros(len(candidates))
     for group in groups:
-        first = group[0]
-        parts = [
-            Scenario.model_validate({**dict(first), "controller": {"kind": controller, "preset": "none", **table}})
-            for table in candidates
-        ]
-        scenarios = [one.model_copy(update={"controller": part.controller}) for part in parts for one in group]
-        recording = load_engine(default_engine(len(scenarios)))(assemble_all(scenarios), no_watch)
+        parts = [part_from(CONTROLLER, {"kind": controller, "preset": "none", **table}) for table in candidates]
+        scenarios = [one.model_copy(update={CONTROLLER.name: part}) for part in parts for one in group]
+        batch = assemble_all(scenarios)
+        recording = load_engine(default_engine(len(scenarios)))(batch, no_watch)
         if recording.interrupted:
             raise KeyboardInterrupt  # half a flight must not be judged
-        times = recording.steps * first.period
-        scores = [objective(one, recording.signals[:, :, i], times) for i, one in enumerate(scenarios)]
+        times, table = recording.steps * group[0].period, score_table(batch, recording.state)
+        scores = [
+            objective(one, flight_data(batch.loop.layout, recording.signals[:, :, i], times, {}), table.row(i))
+            for i, one in enumerate(scenarios)
+        ]
         total += np.array(scores).reshape(len(candidates), len(group)).mean(axis=1)
     return [float(x) for x in total / len(groups)]
 

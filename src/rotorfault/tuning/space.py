@@ -1,13 +1,18 @@
 """What a search may change of each controller, and how a point of the search becomes settings.
 
 Every number is searched on a logarithmic scale between two bounds. Attitude weights are searched as the gains that
-they give at rest (k1, k2), which is the same choice in more telling numbers. Weights of the position axes stay as
-the paper prints them; only floor and cap of |e| are searched.
+they give at rest (k1, k2), which is the same choice in more telling numbers. What is not searched keeps the default
+of the law's settings: weights and reaching gains of the sliding surfaces, attitude R, and the weights of the position
+axes, of which only floor and cap of |e| are searched.
 """
 
 from __future__ import annotations
 
 from typing import Any
+
+from rotorfault.autopilot.control.ismc import IsmcSettings
+from rotorfault.autopilot.control.roismc import RoismcSettings
+from rotorfault.autopilot.control.sdre import Weights
 
 # Dotted key (below `controller`), lowest, start, highest; searched on a logarithmic scale.
 Space = list[tuple[str, float, float, float]]
@@ -50,7 +55,6 @@ SPACES: dict[str, Space] = {
         ("cap.xy", 0.1, 0.34, 2.0), ("cap.z", 0.1, 0.3, 2.0), ("floor", 0.03, 0.1, 1.0),
     ],
 }  # fmt: skip
-R_ATTITUDE = 0.0088
 
 
 def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
@@ -73,13 +77,14 @@ def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
         prefix = "weights." if controller == "roismc" else ""
         put(f"{prefix}error_cap", [v["cap.xy"], v["cap.xy"], v["cap.z"]])
         put(f"{prefix}error_floor", [v["floor"]] * 3)
-        # Attitude weights from the gains wanted at rest: k1 = sqrt(q/r), k2 = sqrt(q_rate/r + 2 k1).
+        # Attitude weights from the gains at rest: k1 = sqrt(q/r), k2 = sqrt(q_rate/r + 2 k1).
         k1 = [v["roll.k1"], v["roll.k1"], v["yaw.k1"]]
         k2 = [v["roll.k2"], v["roll.k2"], v["yaw.k2"]]
-        put(f"{prefix}attitude_q_angle", [float(f"{R_ATTITUDE * k * k:.4g}") for k in k1])
+        R = Weights().attitude_r
+        put(f"{prefix}attitude_q_angle", [float(f"{r * k * k:.4g}") for r, k in zip(R, k1, strict=True)])
         put(
             f"{prefix}attitude_q_rate",
-            [float(f"{R_ATTITUDE * max(b * b - 2 * a, 0.0):.4g}") for a, b in zip(k1, k2, strict=True)],
+            [float(f"{r * max(b * b - 2 * a, 0.0):.4g}") for r, a, b in zip(R, k1, k2, strict=True)],
         )
     if controller == "ismc":
         law["position_gain"] = {"error": [v["position_gain.error"]] * 3, "rate": [v["position_gain.rate"]] * 3}
@@ -88,11 +93,9 @@ def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
             "rate": [v["roll.k2"], v["roll.k2"], v["yaw.k2"]],
         }
     if controller in ("roismc", "ismc"):
-        paper = controller == "ismc"
-        law["position"]["weight"] = [0.121, 0.765, 0.876] if paper else [0.0349, 0.0423, 0.0265]
-        law["position"]["k"] = [0.164, 0.665, 0.0212] if paper else [0.01] * 3
-        law["attitude"]["weight"] = [-0.614, -0.751, -0.232] if paper else [0.0234, 0.087, 0.0766]
-        law["attitude"]["k"] = [0.0112, 0.0156, 0.876] if paper else [0.1] * 3
+        defaults = RoismcSettings() if controller == "roismc" else IsmcSettings()
+        for group, switching in (("position", defaults.position), ("attitude", defaults.attitude)):
+            law[group] |= {"weight": list(switching.weight), "k": list(switching.k)}
     if controller == "smc":
         law["position"].update({key: [v[f"position.{key}"]] * 3 for key in ("slope", "reaching", "K")})
         for key in ("slope", "reaching", "K"):

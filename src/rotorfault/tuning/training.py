@@ -17,19 +17,20 @@ Objective of a flight, the smaller the better:
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from rotorfault.engine.batch import Array
-from rotorfault.model.telemetry import SIGNAL_NAMES, quantities
-from rotorfault.results.metrics import cost, first_loss
+from rotorfault.loop.scores import SETTLED
+from rotorfault.maths.arrays import Array
+from rotorfault.plant import FAULT
+from rotorfault.results.flight_data import FlightData
+from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.neighbours import neighbour
-from rotorfault.scenario.scenario import Scenario, load_scenario
+from rotorfault.scenario.scenario import Scenario
 
 LOST = 10.0
-BAND = 0.02
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
 _FAULTY = np.array([1.0, 0.0, 1.0, 0.0])
 _TRACKING = {"paper-sinusoid": 10.0, "paper-square": 2.0}
@@ -68,40 +69,40 @@ def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Sce
     return groups
 
 
-def objective(scenario: Scenario, signals: Array, times: Array) -> float:
+def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
     """What one flight is worth.
 
     Parameters
     ----------
     scenario : Scenario
-    signals : ndarray, shape (records, rows of `Signals`)
-    times : ndarray, shape (records,)
-        In s.
+        That was flown.
+    data : FlightData
+        Its records.
+    scores : mapping
+        Its row of a score table.
     """
-    if first_loss(signals, None) is not None:
+    if not scores["survived"]:
         return LOST
-    data = columns(signals, times)
-    flags = data["fault_flag"].values
-    onset = float(scenario.fault[0].settings.time)
+    times, flags = data["time"].values, data["fault_flag"].values
+    onset = float(scenario.all(FAULT)[0].settings.time)
     k = int(np.searchsorted(times, onset - 1e-9))
     tracking = _TRACKING.get(scenario.name)
     error = data["position"].values - data["position_reference"].values
     worth = _settling(error, times, onset, k) if tracking is None else tracking * float(np.sqrt(np.mean(error**2)))
     wrong = np.abs(flags[-1] - _FAULTY).sum() + flags[:k].max(axis=0, initial=0.0).sum()
     wrong += flags[k:, [1, 3]].max(axis=0, initial=0.0).sum()
-    attitude, virtual = data["attitude"].values, data["virtual_attitude"].values
-    tilt = float(np.arccos(np.cos(attitude[:, 0]) * np.cos(attitude[:, 1])).max())
+    virtual = data["controller.virtual_attitude"].values
     return (
         worth
         + float(wrong)
-        + 0.3 * math.log10(1.0 + cost(data))
-        + max(0.0, tilt - 1.1)
+        + 0.3 * math.log10(1.0 + scores["cost"])
+        + max(0.0, scores["tilt_max"] - 1.1)
         + 0.04 * math.log10(1.0 + float(np.mean(virtual**2)))
     )
 
 
 def _settling(error: Array, times: Array, onset: float, k: int) -> float:
-    excess = np.max(np.abs(error) / (BAND * np.abs(error[0])), axis=1)
+    excess = np.max(np.abs(error) / (SETTLED * np.abs(error[0])), axis=1)
     every = float(times[1] - times[0])
     before, after = np.flatnonzero(excess[:k] > 1.0), np.flatnonzero(excess[k:] > 1.0)
     first = (before[-1] + 1) * every if len(before) else 0.0
@@ -110,15 +111,3 @@ def _settling(error: Array, times: Array, onset: float, k: int) -> float:
     if first < onset - every:
         return float(first + late + max(0.0, float(excess[k:].max()) - 0.7) + left)
     return float(0.6 * onset + late + left)
-
-
-def columns(signals: Array, times: Array) -> Any:
-    """Records by name, in the shape that `rotorfault.results.metrics` reads them, without the cost of a dataset."""
-    found: dict[str, Any] = {"time": SimpleNamespace(values=times)}
-    row = 0
-    for name in quantities():
-        width = sum(1 for full in SIGNAL_NAMES if full.partition(".")[0] == name)
-        block = signals[:, row : row + width]
-        found[name] = SimpleNamespace(values=block if width > 1 else block[:, 0])
-        row += width
-    return found

@@ -11,6 +11,7 @@ import pytest
 from riccati_problems import (
     ONE,
     broadcast,
+    closed_loop_poles,
     converged,
     cost_is_positive,
     exactly_stable,
@@ -22,6 +23,7 @@ from riccati_problems import (
     random_problem,
     relative,
     rightmost,
+    solve_dense,
     stack,
 )
 from scipy.linalg import block_diag, solve_continuous_are, solve_continuous_lyapunov
@@ -39,11 +41,9 @@ from rotorfault.autopilot.control.riccati import (
     routh_stable,
 )
 from rotorfault.autopilot.control.riccati_reference import (
-    closed_loop_poles,
     cost_matrix,
     dense_problem,
     matrix,
-    solve_dense,
     solve_iterated,
 )
 from rotorfault.base.errors import InputError

@@ -1,4 +1,4 @@
-"""The chord step, the solver in flight, and the engines on it."""
+"""The solver in flight, and the engines on it."""
 
 from __future__ import annotations
 
@@ -7,76 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from riccati_problems import ONE, broadcast, converged, hostile_starts, one, random_problem
+from riccati_problems import ONE, broadcast, hostile_starts, one, random_problem
 
 from rotorfault.autopilot.control.riccati import (
-    AttitudeProblem,
     Gain,
     attitude_problem,
-    chord_start,
-    chord_step,
     fly,
     guaranteed_gain,
-    residual,
-    routh_stable,
 )
 from rotorfault.autopilot.control.riccati_reference import (
-    matrix,
     solve_iterated,
 )
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten, unflatten
-
-# ----------------------------------------------------------------------------------------------------- chord step
-
-
-def chord_converged(problem: AttitudeProblem, steps: int) -> Gain:
-    gain = chord_start(problem)
-    for _ in range(steps):
-        gain = chord_step(problem, gain)
-    return gain
-
-
-def test_chord_step_converges_in_its_domain_to_the_same_solution() -> None:
-    rng = np.random.default_rng(17)
-    problem = random_problem(rng, 8000, 10.0)
-    right = converged(problem)
-    z = (right.X - problem.W).diag
-    inside = problem.W.norm() < 0.5 * np.minimum(np.minimum(z.x, z.y), z.z)
-    assert np.sum(inside) > 300
-    with np.errstate(all="ignore"):
-        gain = chord_converged(problem, 60)
-        last, stable = residual(problem, gain), routh_stable(problem, gain)
-    assert np.all(last[inside] < 1e-11)
-    assert np.all(stable[inside] == 1.0)
-    for found, expected in ((gain.Y, right.Y), (gain.X, right.X)):
-        assert np.max(((found - expected).norm() / expected.norm())[inside]) < 1e-9
-
-
-def test_chord_step_is_of_first_order_in_the_drift() -> None:
-    """One warm step contracts the error by about |W|/|Z|: the terms it leaves out are the off-diagonal ones."""
-    rng = np.random.default_rng(19)
-    problem = random_problem(rng, 500, 10.0)
-    for factor in (1e-2, 1e-3):
-        small = problem._replace(W=problem.W * factor)
-        start = chord_start(small)
-        before = residual(small, start)
-        after = residual(small, chord_step(small, start))
-        assert np.median(after / before) < 10.0 * factor
-
-
-def test_chord_step_from_the_guaranteed_gain_is_shown_up_by_the_residual() -> None:
-    """It converges to a gain whose three blocks vanish, but whose X is not symmetric."""
-    problem = attitude_problem(Mat3.skew(Vec3(0.3, -0.2, 0.1)), ONE, Vec3(1.0, 2.0, 3.0), ONE, ONE)
-    gain = guaranteed_gain(problem)
-    for _ in range(60):
-        gain = chord_step(problem, gain)
-    Y, X, W = (matrix(M) for M in (gain.Y, gain.X, problem.W))
-    Z = X - W
-    assert np.abs(Z.T @ Z - matrix(problem.Qd) - W.T @ W - Y - Y.T).max() < 1e-12
-    assert np.abs(Y.T @ Z - Z.T @ Y).max() < 1e-12
-    assert residual(problem, gain) > 1e-2
-
 
 # ------------------------------------------------------------------------------------------------------ in flight
 

@@ -11,8 +11,9 @@ import xarray as xr
 
 from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.results.dataset import dataset
-from rotorfault.results.metrics import cost, finite_or_none
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.results.metrics import cost
+from rotorfault.results.outcome import finite_or_none
+from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.measures import chattering, measure
 
 

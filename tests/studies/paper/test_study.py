@@ -19,9 +19,10 @@ from rotorfault.autopilot.control.riccati import position_gain
 from rotorfault.autopilot.control.sdre import Weights
 from rotorfault.base.errors import InputError
 from rotorfault.cli.main import app
-from rotorfault.flight.flight import prepare
-from rotorfault.results.metrics import finite_or_none
-from rotorfault.scenario.scenario import load_scenario, parse_overrides
+from rotorfault.flight.fly import prepare
+from rotorfault.results.outcome import finite_or_none
+from rotorfault.scenario.overrides import parse_overrides
+from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper import ablation, claims, judges, sensitivity, table1, wind_sweep
 from rotorfault.studies.paper.cases import run_of
 from rotorfault.studies.paper.measures import measure

@@ -41,5 +41,6 @@ ALLOCATION = Slot(
     "allocators",
     sort="allocator",
     default="effectiveness",
+    calm="nominal",
     inputs=_inputs,
 )

@@ -166,6 +166,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def __init__(self, law: Law[Any], settings: CascadeSettings, telemetry: type[Record]) -> None:
         self.law = law
         self.settings = settings
+        self._record: Any = telemetry
         self.Telemetry = telemetry  # type: ignore[misc]  # of the law's kind
 
     def parameters(self, context: Context) -> CascadeParameters:
@@ -248,7 +249,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         )
         output = ControlOutput(Wrench(thrust, torque_B), direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
-        return CascadeMemory(position_memory, attitude_memory, following), output, self.Telemetry(*own, *recorded)
+        return CascadeMemory(position_memory, attitude_memory, following), output, self._record(*own, *recorded)
 
 
 def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:

@@ -40,8 +40,8 @@ class AttitudeProblem(NamedTuple):
 class Gain(NamedTuple):
     """Gain of the scaled problem, u = -(Y e + X omega), and the state that `fly` stores.
 
-    X is the lower right block of P, and symmetric, after any Newton-Kleinman or chord step. The X of
-    `guaranteed_gain` is a gain only: it is not symmetric.
+    X is the lower right block of P, and symmetric, after any Newton-Kleinman step. The X of `guaranteed_gain` is
+    a gain only: it is not symmetric.
     """
 
     Y: Mat3  # 1/s^2
@@ -92,17 +92,10 @@ def guaranteed_gain(problem: AttitudeProblem) -> Gain:
     """The gain Y = diag sqrt(q_p), K = diag sqrt(q_d + 2 sqrt(q_p)) + W, which stabilises for every W.
 
     It cancels W, which leaves three stable double integrators. A start for Newton-Kleinman and the gain of an
-    emergency, and nothing else: K is not symmetric, so a chord step from it would "converge" to a wrong answer,
-    and no cost matrix belongs to it.
+    emergency, and nothing else: K is not symmetric, so no cost matrix belongs to it.
     """
-    start = chord_start(problem)
-    return Gain(start.Y, start.X + problem.W)
-
-
-def chord_start(problem: AttitudeProblem) -> Gain:
-    """The solution for W = 0 and diagonal weights, three axes by themselves; cold start of `chord_step`."""
     y = problem.Qp.diag.map(sqrt)
-    return Gain(Mat3.diagonal(y), Mat3.diagonal((problem.Qd.diag + 2.0 * y).map(sqrt)))
+    return Gain(Mat3.diagonal(y), Mat3.diagonal((problem.Qd.diag + 2.0 * y).map(sqrt)) + problem.W)
 
 
 def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> Gain:
@@ -155,42 +148,6 @@ def newton_kleinman_step(problem: AttitudeProblem, gain: Gain) -> Gain:
     N = (Y + G) * 0.5
     X = _mirrored((B + G + Mat3.skew(a)) @ adj_Z) * (0.5 * reciprocal(d))
     return Gain(N, X)
-
-
-def chord_step(problem: AttitudeProblem, gain: Gain) -> Gain:
-    """Improve a symmetric gain cheaply: Newton's step with the off-diagonal parts of Y and Z left out of its slope.
-
-    For diagonal Qp, zero diagonal of W and |W| < 0.5 min z_ii only (no failure in 12,000 cold starts). The weaker
-    |W| < 0.5 |Z| is enough where the axes' weights are alike, not where they span decades: 1 in 30 of those diverge.
-    Start it from `chord_start` or another gain with symmetric X, never from `guaranteed_gain`, and test its outcome
-    with `routh_stable`.
-    """
-    Y, X = gain
-    Z = X - problem.W
-    E1 = problem.Qp - Y.T @ Y
-    E2 = _rate_defect(problem, gain)
-    F = Y.T @ Z - Z.T @ Y
-    y, z = Y.diag, Z.diag
-    dy = E1.diag.over(2.0 * y)
-    dx = (E2.diag + 2.0 * dy).over(2.0 * z)
-
-    def pair(
-        y_i: Scalar, y_j: Scalar, z_i: Scalar, z_j: Scalar, e1: Scalar, e2: Scalar, f: Scalar
-    ) -> tuple[Scalar, Scalar, Scalar]:
-        kappa = (y_i - y_j) / (z_i + z_j)
-        rho = -f - kappa * e2
-        delta = y_i * (z_j + kappa) - y_j * (kappa - z_i)
-        dy_ij = (e1 * (z_j + kappa) - y_j * rho) / delta
-        dy_ji = (y_i * rho - (kappa - z_i) * e1) / delta
-        return dy_ij, dy_ji, (e2 + dy_ij + dy_ji) / (z_i + z_j)
-
-    xy, yx, x_xy = pair(y.x, y.y, z.x, z.y, E1.xy, E2.xy, F.xy)
-    xz, zx, x_xz = pair(y.x, y.z, z.x, z.z, E1.xz, E2.xz, F.xz)
-    yz, zy, x_yz = pair(y.y, y.z, z.y, z.z, E1.yz, E2.yz, F.yz)
-    return Gain(
-        Y + Mat3(dy.x, xy, xz, yx, dy.y, yz, zx, zy, dy.z),
-        X + Mat3(dx.x, x_xy, x_xz, x_xy, dx.y, x_yz, x_xz, x_yz, dx.z),
-    )
 
 
 def routh_stable(problem: AttitudeProblem, gain: Gain) -> Scalar:

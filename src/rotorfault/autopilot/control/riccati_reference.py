@@ -1,7 +1,8 @@
 r"""The attitude block of the Riccati equation (22) solved to rounding error, for tests and for design. Not in flight.
 
-Two independent ways, on floats: `solve_iterated` repeats the Newton-Kleinman step of `rotorfault.autopilot.control.riccati`
-until it is done, `solve_dense` hands the 6x6 matrices to SciPy's Schur method. The state is ordered angles, rates.
+On floats: `solve_iterated` repeats the Newton-Kleinman step of `rotorfault.autopilot.control.riccati` until it is
+done; `dense_problem` writes the block as the 6x6 matrices that other libraries take. The state is ordered angles,
+rates.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import solve_continuous_are
 
 from rotorfault.autopilot.control.riccati import (
     AttitudeProblem,
@@ -94,13 +94,6 @@ def cost_matrix(problem: AttitudeProblem, gain: Gain) -> Matrix:
     return np.asarray(np.outer(unscale, unscale) * scaled, dtype=np.float64)
 
 
-def closed_loop_poles(problem: AttitudeProblem, gain: Gain) -> npt.NDArray[np.complex128]:
-    """The six poles in 1/s of the attitude block under a gain, roots of det(lambda^2 I + lambda Z + Y)."""
-    zero, one = np.zeros((3, 3)), np.eye(3)
-    A = np.block([[zero, one], [-matrix(gain.Y), matrix(problem.W) - matrix(gain.X)]])
-    return np.asarray(np.linalg.eigvals(A), dtype=np.complex128)
-
-
 class DenseProblem(NamedTuple):
     """The attitude block as plain matrices, unscaled: x_dot = A x + B u, cost x^T Q x + u^T R u."""
 
@@ -111,7 +104,17 @@ class DenseProblem(NamedTuple):
 
 
 def dense_problem(drift: Mat3, b: Vec3, q_angle: Vec3, q_rate: Vec3, r: Vec3) -> DenseProblem:
-    """Plain matrices of the problem that `rotorfault.autopilot.control.riccati.attitude_problem` scales; same arguments."""
+    """The problem of `rotorfault.autopilot.control.riccati.attitude_problem` as plain matrices, not scaled.
+
+    Parameters
+    ----------
+    drift, b, q_angle, q_rate, r
+        As for `attitude_problem`.
+
+    Returns
+    -------
+    DenseProblem
+    """
     zero, one = np.zeros((3, 3)), np.eye(3)
     return DenseProblem(
         A=np.block([[zero, one], [zero, matrix(drift)]]),
@@ -119,11 +122,6 @@ def dense_problem(drift: Mat3, b: Vec3, q_angle: Vec3, q_rate: Vec3, r: Vec3) ->
         Q=np.diag([float(q_i) for q_i in (*q_angle, *q_rate)]),
         R=np.diag([float(r_i) for r_i in r]),
     )
-
-
-def solve_dense(problem: DenseProblem) -> Matrix:
-    """P of (22), (6, 6), by `scipy.linalg.solve_continuous_are`."""
-    return np.asarray(solve_continuous_are(problem.A, problem.B, problem.Q, problem.R), dtype=np.float64)
 
 
 def matrix(M: Mat3) -> Matrix:

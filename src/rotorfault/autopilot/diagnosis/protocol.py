@@ -62,5 +62,6 @@ DIAGNOSIS = Slot(
     "source of diagnosis: which rotors are believed to have lost how much",
     "diagnoses",
     default="luenberger",
+    calm="off",
     inputs=_inputs,
 )

@@ -8,7 +8,7 @@ from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs,
 from rotorfault.maths.geometry import zeros
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Nothing, Record
-from rotorfault.model.signals import Estimate
+from rotorfault.model.signals import Estimate, Reading
 from rotorfault.model.slot import register
 
 
@@ -28,6 +28,6 @@ class Direct(Estimator[Nothing, Nothing]):
             v_W=required(readings, "velocity", "direct").value,
             q_WB=required(readings, "attitude", "direct").value,
             omega_B=required(readings, "rates", "direct").value,
-            specific_force_B=zeros() if force == () else force.value,
+            specific_force_B=force.value if isinstance(force, Reading) else zeros(),
         )
         return memory, estimate, Nothing()

@@ -12,12 +12,18 @@ from typing import Any
 
 from rotorfault.base.config import parse_toml
 
-DEFAULT = "tuned"
+
+@lru_cache
+def _tables(controller: str) -> dict[str, dict[str, Any]]:
+    file = resources.files("rotorfault.autopilot.presets") / f"{controller}.toml"
+    if not file.is_file():
+        return {}
+    return parse_toml(file.read_text(encoding="utf-8"), f"{controller}.toml")
 
 
 @lru_cache
 def presets(controller: str) -> Mapping[str, Mapping[str, Any]]:
-    """All presets of a controller; empty for one without a file.
+    """All presets of a controller; none for one without a file.
 
     Parameters
     ----------
@@ -29,9 +35,17 @@ def presets(controller: str) -> Mapping[str, Mapping[str, Any]]:
     mapping
         Settings by name of the preset; not to be changed, for the file is read once.
     """
-    file = resources.files("rotorfault.autopilot.presets") / f"{controller}.toml"
-    if not file.is_file():
-        return {}
-    tables = parse_toml(file.read_text(encoding="utf-8"), f"{controller}.toml")
-    # How a preset was found is for its readers, not a setting.
+    tables = _tables(controller)
     return {name: {key: value for key, value in table.items() if key != "record"} for name, table in tables.items()}
+
+
+def record(controller: str, preset: str) -> Mapping[str, Any]:
+    """How a preset was made, as its file says it; empty where it does not.
+
+    Parameters
+    ----------
+    controller, preset : str
+        Names of both.
+    """
+    made: Mapping[str, Any] = _tables(controller).get(preset, {}).get("record", {})
+    return made

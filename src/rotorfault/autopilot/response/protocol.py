@@ -40,5 +40,6 @@ ON_FAULT = Slot(
     "responses",
     sort="response to a fault",
     default="continue",
+    calm="continue",
     inputs=_inputs,
 )

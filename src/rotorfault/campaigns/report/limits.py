@@ -24,6 +24,7 @@ from rotorfault.campaigns.study import Draw, Study
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.plant import FAULT, WIND
 from rotorfault.scenario.scenario import Scenario
 
 LASTING = {"step": "time", "ramp": "start", "total": "time"}  # kinds of faults, and where their onset stands
@@ -113,8 +114,8 @@ def _understood(scenario: Scenario, study: Study) -> bool:
     names = [part.name for part in study.axis] + [part.name for part in study.draw]
     varied = columns({name: np.ones(1) for name in names})
     return (
-        scenario.wind.kind in WINDS
-        and all(fault.kind in LASTING for fault in scenario.fault)
+        scenario[WIND].kind in WINDS
+        and all(fault.kind in LASTING for fault in scenario.all(FAULT))
         and all(_known(key) or _harmless(key) for key in varied)
     )
 
@@ -122,7 +123,7 @@ def _understood(scenario: Scenario, study: Study) -> bool:
 def _possible(scenario: Scenario, given: Columns, count: int) -> Array:
     """Indicators with and without yaw, shape (2, N)."""
     effect = [np.ones(count) for _ in range(4)]
-    for k, fault in enumerate(scenario.fault):
+    for k, fault in enumerate(scenario.all(FAULT)):
         loss = _of(given, f"fault.{k}.loss", getattr(fault.settings, "loss", 1.0))
         onset = _of(given, f"fault.{k}.{LASTING[fault.kind]}", getattr(fault.settings, LASTING[fault.kind]))
         rotor = _of(given, f"fault.{k}.rotor", fault.settings.rotor)
@@ -130,8 +131,8 @@ def _possible(scenario: Scenario, given: Columns, count: int) -> Array:
         for i in range(4):
             effect[i] = effect[i] * np.where(rotor == i + 1, lasting, 1.0)
     losses = PerRotor.of(1.0 - each for each in effect)
-    still = scenario.wind.kind == "none"
-    wind = (0.0, 0.0, 0.0) if still else scenario.wind.settings.velocity_W
+    still = scenario[WIND].kind == "none"
+    wind = (0.0, 0.0, 0.0) if still else scenario[WIND].settings.velocity_W
     wind_W = Vec3(*(_of(given, f"wind.velocity_W.{i}", wind[i]) + np.zeros(count) for i in range(3)))
     found = np.full((2, count), np.nan)
     for vehicle, which in _vehicles(scenario, given, count):

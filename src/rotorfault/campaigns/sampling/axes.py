@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.errors import unknown
+from rotorfault.base.errors import InputError, unknown
 
 Columns = dict[str, NDArray[Any]]
 

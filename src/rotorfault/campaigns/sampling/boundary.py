@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import isotonic_regression
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.errors import unknown
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.sampling.statistics import Array, Interval, check_level, clopper_pearson
 
 MONOTONE = ("rising", "falling")

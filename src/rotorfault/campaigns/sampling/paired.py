@@ -29,8 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import bdtr, betaln, gammaln, ndtri, stdtrit, xlogy
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.errors import unknown
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.sampling.statistics import Array, check_level
 
 HALVINGS = 60  # of an interval of length 2: to rounding

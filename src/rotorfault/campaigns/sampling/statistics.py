@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaincinv, ndtri
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.errors import unknown
+from rotorfault.base.errors import InputError, unknown
 
 Array = NDArray[np.float64]
 

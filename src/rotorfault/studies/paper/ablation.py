@@ -22,13 +22,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.ismc import IsmcSettings
 from rotorfault.autopilot.control.riccati import position_gain
 from rotorfault.autopilot.control.roismc import RoismcSettings
 from rotorfault.autopilot.control.sdre import Weights, position_gains, sdre_parameters
 from rotorfault.base.files import write_atomically
 from rotorfault.maths.geometry import zeros
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.grid_figure import grid_figure
 from rotorfault.studies.paper.verdicts import stays
@@ -84,7 +85,7 @@ def runs() -> list[Run]:
 
 @lru_cache(maxsize=1)
 def _tuned() -> Any:
-    return load_scenario("paper-set-point", {"controller.kind": "roismc"}).controller.settings
+    return load_scenario("paper-set-point", {"controller.kind": "roismc"})[CONTROLLER].settings
 
 
 def _cascade() -> dict[str, Any]:

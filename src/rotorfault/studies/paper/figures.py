@@ -17,7 +17,7 @@ from rotorfault.report.figures import FIGURES, position_figure
 from rotorfault.report.panels import Drawn, Panel, flights, legend, sample, solid, timeline
 from rotorfault.report.rotor_layout import layout_figure
 from rotorfault.report.style import BLUE, GREY, STYLE, VERMILION, new_figure
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, run_of
 from rotorfault.studies.runs import Result
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from rotorfault.maths.arrays import ANGLES, AXES
 from rotorfault.studies.paper.measures import COST_READINGS, LEVEL
 from rotorfault.studies.paper.verdicts import Reading, extra, fate, lost, lower, survived, text
 from rotorfault.studies.runs import Result
 
 MATCHED = "matched bandwidth"
-AXES, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
 SECONDS = 5.0  # s: "within seconds", "in a short period"
 CHATTER_SHARE = 0.05  # of the steady commands' power above the loop's bandwidth
 CHATTER_SCALE = 0.1  # of the total variation that discontinuous switching makes

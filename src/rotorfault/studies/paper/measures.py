@@ -15,13 +15,16 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from rotorfault.loop.scoring import SETTLED
+from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.loop.scores import SETTLED
+from rotorfault.maths.arrays import ANGLES, Array
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.vehicle import Vehicle, wrench_of
-from rotorfault.results.metrics import attitude_error, cost
+from rotorfault.reference import REFERENCE
+from rotorfault.results.metrics import attitude_error, cost, lyapunov_violations
 from rotorfault.scenario.scenario import Scenario, scenario_from
 
-LABEL = "1"  # version of what `measure` gives
+LABEL = "2"  # version of what `measure` gives
 
 STEADY = 5.0  # s: the start and the faults at 1.8 s have died away
 LAST = 1.0  # s at the end that residuals are averaged over
@@ -34,8 +37,6 @@ COST_READINGS: dict[str, dict[str, Any]] = {
     "floor 0.1 m in Q and R": {"floor": 0.1, "floor_r": 0.1},
     "floor in Q only": {"floor_r": 0.0},
 }
-
-Array = NDArray[np.float64]
 
 
 def measure(data: xr.Dataset) -> dict[str, Any]:
@@ -52,6 +53,7 @@ def measure(data: xr.Dataset) -> dict[str, Any]:
     speed = data["rotor_speed"].values
     command = data["thrust_command"].values
     late = time >= time[-1] - LAST
+    slides = "controller.lyapunov" in data
     attitude = data["attitude"].values
     error = data["position"].values - data["position_reference"].values
     return {
@@ -69,8 +71,10 @@ def measure(data: xr.Dataset) -> dict[str, Any]:
         "late_rms_error": _list(np.sqrt(np.mean(error[len(error) // 2 :] ** 2, axis=0))),
         "returns": returns(data, scenario),
         "reaching": reaching(data, scenario),
-        "sigma_start": float(np.abs(np.hstack([data[name].values[0] for name in _SIGMA])).max()),
-        "lyapunov_start": float(data["lyapunov"].values[0]),
+        "sigma_start": float(np.abs(np.hstack([data[name].values[0] for name in _SIGMA])).max()) if slides else None,
+        "lyapunov_start": float(data["controller.lyapunov"].values[0]) if slides else None,
+        "lyapunov_violations": lyapunov_violations(data) if slides else None,
+        "attitude_demand_mse": _named(attitude_error(data, "demand")),
         "attitude_max": _list(np.abs(attitude).max(axis=0)),
         "disturbance": disturbance(data, vehicle),
         "disturbance_bound": _bounds(scenario),
@@ -78,7 +82,7 @@ def measure(data: xr.Dataset) -> dict[str, Any]:
     }
 
 
-_SIGMA = ("sigma_position", "sigma_attitude")
+_SIGMA = ("controller.sigma_position", "controller.sigma_attitude")
 _GROUPS = ("position", "attitude")
 
 
@@ -124,7 +128,7 @@ def chattering(time: Array, command: Array, band: float) -> dict[str, Any]:
 
 def _law(scenario: Scenario) -> Any:
     """Settings of the law flown; None for a controller that is no law in the cascade."""
-    return getattr(scenario.controller.settings, "law", None)
+    return getattr(scenario[CONTROLLER].settings, "law", None)
 
 
 def outside_layer(data: xr.Dataset, scenario: Scenario) -> dict[str, float] | None:
@@ -150,9 +154,9 @@ def _onset(data: xr.Dataset) -> int:
 
 def reaching(data: xr.Dataset, scenario: Scenario) -> list[dict[str, float | None]] | None:
     """SMC only: when s first enters the layer, and the bound |s(0)|/K on it, per position axis in s."""
-    if scenario.controller.kind != "smc":
+    if scenario[CONTROLLER].kind != "smc":
         return None
-    settings, s, time = _law(scenario).position, data["sigma_position"].values, data["time"].values
+    settings, s, time = _law(scenario).position, data["controller.sigma_position"].values, data["time"].values
     found = []
     for i in range(3):
         inside = np.flatnonzero(np.abs(s[:, i]) <= settings.layer)
@@ -172,9 +176,9 @@ def returns(data: xr.Dataset, scenario: Scenario) -> dict[str, list[float | None
     A window lasts from a switch of any axis to the next one; those shorter than 5 s are left out. Position and yaw:
     within 2 % of a switch's height of the filtered reference on all axes; ``level``: roll and pitch within 0.1 rad.
     """
-    if scenario.reference.kind != "square":
+    if scenario[REFERENCE].kind != "square":
         return None
-    s, time = scenario.reference.settings, data["time"].values
+    s, time = scenario[REFERENCE].settings, data["time"].values
     error = np.abs(data["position"].values - data["position_reference"].values)
     yaw, tilt = np.abs(attitude_error(data, "reference")[:, 2]), np.abs(data["attitude"].values[:, :2])
     small = {
@@ -267,6 +271,11 @@ def _spread(values: Array, time: Array) -> dict[str, Any]:
         "range_98": float((high - low).max()),
         "range_steady": float(np.ptp(steady, axis=0).max()) if len(steady) else None,
     }
+
+
+def _named(error: Array) -> dict[str, float]:
+    """Mean square of the columns roll, pitch, yaw, in rad^2."""
+    return dict(zip(ANGLES, _list(np.mean(error**2, axis=0)), strict=True))
 
 
 def _list(values: Array) -> list[float]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, StrictUndefined
 
-from rotorfault.autopilot.presets import presets
+from rotorfault.autopilot.presets import record as record_of
 from rotorfault.base.versions import versions
 from rotorfault.studies.paper import ablation, figures, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
@@ -99,7 +99,7 @@ def _records() -> list[dict[str, Any]]:
     """How the presets that were flown were found."""
     found = []
     for controller in ("smc", "roismc"):
-        record = presets(controller).get("tuned", {}).get("record")
+        record = record_of(controller, "tuned")
         if record:
             found.append({"controller": controller, **record})
     return found

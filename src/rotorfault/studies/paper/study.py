@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import output_folder, write_atomically
-from rotorfault.base.errors import unknown
+from rotorfault.base.text_table import table_lines
 from rotorfault.report import figures as drawing
 from rotorfault.studies.paper import ablation, claims, figures, sensitivity, table1
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, matched_runs
@@ -124,14 +124,13 @@ def line(result: Result) -> str:
 
 def text(done: Reproduced) -> str:
     """What a reproduction gave, for the terminal."""
-    lines = ["Claims"]
-    lines += [f"  {one.id:>4}  {one.verdict:<32}  {one.claim}" for one in done.claims]
-    lines += ["", "Table 1, cost of ROISMC over that of SMC"]
+    claim_rows = [(claim.id, claim.verdict, claim.claim) for claim in done.claims]
+    ratios: list[tuple[str, ...]] = [("", "paper", "matched", "equal effort")]
     for row in table1.rows(done.results):
-        ratios = [("paper", row.paper.ratio), ("matched", row.matched.ratio), ("equal effort", row.equal.ratio)]
-        lines.append(
-            f"  {row.title:<12}" + "  ".join(f"{n} {'-' if r is None else format(r, '.3f')}" for n, r in ratios)
-        )
+        each = (row.paper.ratio, row.matched.ratio, row.equal.ratio)
+        ratios.append((row.title, *("-" if ratio is None else f"{ratio:.3f}" for ratio in each)))
+    lines = ["Claims", *table_lines(claim_rows, "><<", indent=2)]
+    lines += ["", "Table 1, cost of ROISMC over that of SMC", *table_lines(ratios, "<>>>", indent=2)]
     took = ", ".join(f"{stage} {seconds:.0f} s" for stage, seconds in done.seconds.items())
     lines += ["", f"{len(done.results)} flights, {done.flown} flown now ({took}); see {done.folder / 'report.html'}"]
     return "\n".join(lines)

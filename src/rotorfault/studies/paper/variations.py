@@ -6,7 +6,8 @@ import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from rotorfault.scenario.scenario import load_scenario
+from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.measures import COST_READINGS
 from rotorfault.studies.runs import Run
@@ -52,7 +53,7 @@ class Variation(NamedTuple):
 
 
 def _floor(factor: float) -> dict[str, Any]:
-    weights = load_scenario("paper-set-point", {"controller.kind": "roismc"}).controller.settings.law.weights
+    weights = load_scenario("paper-set-point", {"controller.kind": "roismc"})[CONTROLLER].settings.law.weights
     floors = [float(f"{factor * floor:.4g}") for floor in weights.error_floor]
     return {"controller.law.weights.error_floor": floors}
 
