@@ -2,118 +2,118 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorfault.base.errors import InputError
+from rotorfault.cli.app import AllowCode, app, finish
+
+if TYPE_CHECKING:
+    from rotorfault.campaigns.api import Campaign
 
 
-def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, Path, bool], None]) -> None:
-    """Add the commands to the program.
+@app.command()
+def campaign(
+    study: Annotated[
+        str | None, typer.Argument(help="Built-in study (see 'rotorfault list studies') or a TOML file.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in the folder.")] = False,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Go on; move damaged parts aside and fly them anew.")
+    ] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Threads; one per core if not given.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="tcp://...", help="Fly on the workers of this Dask scheduler.")
+    ] = None,
+    vehicle: Annotated[str | None, typer.Option(help="Vehicle in place of the study's.")] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
+    budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
+    report_only: Annotated[
+        bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
+    ] = False,
+    allow_code: AllowCode = False,
+) -> None:
+    """Fly a survival campaign: thousands of flights over a map, most of them where survival is uncertain.
 
-    Parameters
-    ----------
-    app : typer.Typer
-    load : callable
-        Loads a module of the package by name.
-    finish : callable
-        Prints and writes a flight.
+    Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
+    Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
+
+    Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
     """
+    from rotorfault.campaigns.api import Campaign
+    from rotorfault.campaigns.api import campaign as fly_campaign
 
-    @app.command()
-    def campaign(
-        study: Annotated[
-            str | None, typer.Argument(help="Built-in study (see 'rotorfault list studies') or a TOML file.")
-        ] = None,
-        out: Annotated[
-            Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
-        ] = None,
-        resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in the folder.")] = False,
-        repair: Annotated[
-            bool, typer.Option("--repair", help="Go on; move damaged parts aside and fly them anew.")
-        ] = False,
-        workers: Annotated[int | None, typer.Option(min=1, help="Threads; one per core if not given.")] = None,
-        scheduler: Annotated[
-            str | None, typer.Option(metavar="tcp://...", help="Fly on the workers of this Dask scheduler.")
-        ] = None,
-        vehicle: Annotated[str | None, typer.Option(help="Vehicle in place of the study's.")] = None,
-        preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
-        seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
-        budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
-        report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
-        report_only: Annotated[
-            bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
-        ] = False,
-    ) -> None:
-        """Fly a survival campaign: thousands of flights over a map, most of them where survival is uncertain.
-
-        Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
-        Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
-
-        Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
-        """
-        if report_only:
-            if out is None:
-                raise InputError("--report-only needs the folder of a campaign; give it with --out")
-            if study is not None or resume or repair or not report:
-                raise InputError(
-                    "--report-only makes the report of what is in --out and flies nothing; give it alone"
-                )
-            _report(load("campaigns.api").Campaign(out), load)
-            return
-        if study is None:
-            raise InputError(
-                "no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list studies'"
-            )
-        try:
-            done = load("campaigns.api").campaign(
-                study, out, resume=resume, repair=repair, vehicle=vehicle, preset=preset, seed=seed, budget=budget,
-                workers=workers, scheduler=scheduler, say=lambda line: typer.echo(line, err=True),
-            )  # fmt: skip
-        except KeyboardInterrupt:
-            typer.echo("interrupted; what is done is kept, go on with the same command and --resume", err=True)
-            raise typer.Exit(130) from None
-        if report:
-            _report(done, load)
-
-    @app.command()
-    def replay(
-        folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a campaign.")],
-        flight: Annotated[int | None, typer.Option(metavar="ID", help="Column 'id' of the campaign's table.")] = None,
-        cell: Annotated[
-            int | None, typer.Option(help="Or a cell of the map (column 'cell'), with --variant.")
-        ] = None,
-        variant: Annotated[str | None, typer.Option(help="Variant, with --cell.")] = None,
-        number: Annotated[int, typer.Option(help="Which flight of the cell.")] = 0,
-        figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
-        out: Annotated[
-            Path | None, typer.Option(metavar="DIR", help="Folder for results; DIR-replays/ID if not given.")
-        ] = None,
-    ) -> None:
-        """Fly one flight of a campaign once more, exactly, with all records and figures.
-
-        Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
-        """
-        folder = folder.resolve()
-        campaign = load("campaigns.api").Campaign(folder)
-        study, again = campaign.study, load("campaigns.replay")
-        if (flight is None) == (cell is None):
-            raise InputError("give the flight by --flight ID, or by --cell and --variant")
-        if flight is None:
-            if variant is None:
-                raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
-            flight = again.identifier_of(study, variant, cell, number)
-        target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
-        load("files").output_folder(target)
-        finish(campaign.replay(flight), target, figures)
+    if report_only:
+        if out is None:
+            raise InputError("--report-only needs the folder of a campaign; give it with --out")
+        if study is not None or resume or repair or not report:
+            raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
+        _report(Campaign(out))
+        return
+    if study is None:
+        raise InputError(
+            "no study was given; try 'rotorfault campaign partial-loss-map' or see 'rotorfault list studies'"
+        )
+    try:
+        done = fly_campaign(
+            study, out, resume=resume, repair=repair, vehicle=vehicle, preset=preset, seed=seed, budget=budget,
+            workers=workers, scheduler=scheduler, say=lambda line: typer.echo(line, err=True),
+            allow_code=allow_code,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        typer.echo("interrupted; what is done is kept, go on with the same command and --resume", err=True)
+        raise typer.Exit(130) from None
+    if report:
+        _report(done)
 
 
-def _report(campaign: Any, load: Callable[[str], Any]) -> None:
+@app.command()
+def replay(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a campaign.")],
+    flight: Annotated[int | None, typer.Option(metavar="ID", help="Column 'id' of the campaign's table.")] = None,
+    cell: Annotated[int | None, typer.Option(help="Or a cell of the map (column 'cell'), with --variant.")] = None,
+    variant: Annotated[str | None, typer.Option(help="Variant, with --cell.")] = None,
+    number: Annotated[int, typer.Option(help="Which flight of the cell.")] = 0,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for results; DIR-replays/ID if not given.")
+    ] = None,
+    allow_code: AllowCode = False,
+) -> None:
+    """Fly one flight of a campaign once more, exactly, with all records and figures.
+
+    Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
+    """
+    from rotorfault.base.files import output_folder
+    from rotorfault.campaigns.api import Campaign
+    from rotorfault.campaigns.replay import identifier_of
+
+    folder = folder.resolve()
+    campaign = Campaign(folder, allow_code=allow_code)
+    study = campaign.study
+    if (flight is None) == (cell is None):
+        raise InputError("give the flight by --flight ID, or by --cell and --variant")
+    if flight is None:
+        if variant is None:
+            raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
+        flight = identifier_of(study, variant, cell, number)
+    target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
+    output_folder(target)
+    finish(campaign.replay(flight), target, figures)
+
+
+def _report(campaign: Campaign) -> None:
     """Pictures and page of a campaign, finished or not."""
-    with load("progress").Busy("making the report"):
+    from rotorfault.base.progress import Busy
+
+    with Busy("making the report"):
         paths = campaign.report()
     pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
     typer.echo(f"report in {paths[0]}; pictures in {paths[1].parent}: {pictures}, each as SVG too")

@@ -197,7 +197,7 @@ def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, 
 def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
     """What a flight file says of itself."""
     vehicle, controller = scenario.vehicle.vehicle, scenario[CONTROLLER]
-    name = controller.kind if own is None else type(own).__name__
+    name = controller.kind.rpartition(":")[2] if own is None else type(own).__name__
     parts = [
         {"slot": slot.name, "kind": part.kind, "preset": part.preset, "source": part.source}
         for slot, part in scenario.parts()

@@ -172,7 +172,8 @@ def fly_many(
             f"allowed: {MOST_NUMBERS:.1e} numbers; record less, or seldom (record_period)"
         )
     signals = np.full((records, width, count), np.nan)
-    name, flown, done = engine or default_engine(count), 0, 0.0
+    python_only = any(part.make().python_only for group in groups for _, part in group.scenario.parts())
+    name, flown, done = engine or ("python" if python_only else default_engine(count)), 0, 0.0
     tables: list[ScoreTable] = []
     order: list[NDArray[np.intp]] = []
     total = float(sum(len(group.flights) * group.scenario.duration for group in groups))

@@ -88,6 +88,7 @@ class Slot(Generic[B]):
         self.shorthand: Final = shorthand
         self.presets: Final = presets
         self.inputs: Final = inputs
+        self.adapt: Callable[[object], Kind[B] | None] | None = None  # makes a kind of what is none by itself
         self.registry: Final[Registry[B]] = Registry(sort or name, name)
         base.slot = self  # type: ignore[attr-defined]
 

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from rotorfault.flight.flight import Flight, load
 from rotorfault.report import figures
-from rotorfault.results.text import comparison
+from rotorfault.results.text import UNTIL_LOST, comparison
 
 
 def labelled(paths: Sequence[Path]) -> dict[str, Flight]:
@@ -32,6 +32,8 @@ def print_table(flights: dict[str, Flight]) -> None:
         table.add_column(text, overflow="fold")
     for line in lines:
         table.add_row(*line)
+    if any(not flight.outcome.survived for flight in flights.values()):
+        table.caption = f"{UNTIL_LOST} of a flight that was lost: over the time before, not to be compared"
     Console().print(table)
 
 

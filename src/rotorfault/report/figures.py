@@ -160,11 +160,12 @@ def _attitude(drawn: Sequence[Drawn]) -> Figure:
     figure = new_figure(9.5)
     # A vehicle that spins in yaw leaves the panel: the half turn either way is what can be read.
     panels = [
-        Panel(name, (solid("attitude", k), dashed("attitude_command", k, 0.7)), 0.05, core=np.pi)
+        Panel(name, (solid("attitude", k), dashed("controller.attitude_command", k, 0.7)), 0.05, core=np.pi)
         for k, name in enumerate(ANGLES)
     ]
     timeline(figure, panels, drawn)
-    legend(figure, drawn, [sample("command", **REFERENCE | {"linewidth": 0.7})])
+    commanded = any(flight.has("controller.attitude_command") for flight in drawn)
+    legend(figure, drawn, [sample("command", **REFERENCE | {"linewidth": 0.7})] if commanded else [])
     return figure
 
 
@@ -178,21 +179,31 @@ def _rotor_speeds(drawn: Sequence[Drawn]) -> Figure:
 
 
 def _control(drawn: Sequence[Drawn], window: tuple[float, float] | None = None) -> Figure:
-    figure = new_figure(13.5)
+    figure = new_figure(13.5 if any(flight.has("controller.lyapunov") for flight in drawn) else 8.0)
     angles = [r"\mathrm{roll}", r"\mathrm{pitch}", r"\mathrm{yaw}"]
-    V = Panel("V", (solid("lyapunov"),), reach=np.inf)
+    # Sliding variables are drawn where a law has them.
+    slides = any(flight.has("controller.lyapunov") for flight in drawn)
+    V = Panel("V", (solid("controller.lyapunov"),), reach=np.inf)
+    given_up = Panel("yaw given up", (solid("given_up", 2),))
+    first = [Panel("thrust", (solid("thrust_demand"),)), Panel("unallocated", (solid("thrust_unallocated"),))]
     rows = [
-        [Panel("thrust", (solid("thrust_demand"),)), Panel("unallocated", (solid("thrust_unallocated"),)), V],
+        [*first, V if slides else given_up],
         [Panel(f"$\\tau_{name}$", (solid("torque_demand", k),)) for k, name in enumerate("xyz")],
-        [Panel(f"$\\sigma_{name}$", (solid("sigma_position", k),)) for k, name in enumerate("xyz")],
-        [Panel(f"$\\sigma_{{{name}}}$", (solid("sigma_attitude", k),)) for k, name in enumerate(angles)],
     ]
+    if slides:
+        groups = (("sigma_position", list("xyz")), ("sigma_attitude", angles))
+        rows += [
+            [Panel(f"$\\sigma_{{{name}}}$", (solid(f"controller.{signal}", k),)) for k, name in enumerate(names)]
+            for signal, names in groups
+        ]
     grid = figure.subplots(len(rows), 3, squeeze=False, sharex=True)
     for line, panels in zip(grid, rows, strict=True):
         for axes, panel in zip(line, panels, strict=True):
             draw_panel(axes, panel, drawn, window or whole(drawn))
-            axes.set_ylabel(f"{panel.name} {drawn[0].unit_of(panel.curves[0].signal)}")
-    _logarithmic(grid[0, 2], drawn)
+            having = next((flight for flight in drawn if flight.has(panel.curves[0].signal)), drawn[0])
+            axes.set_ylabel(f"{panel.name} {having.unit_of(panel.curves[0].signal)}")
+    if slides:
+        _logarithmic(grid[0, 2], drawn)
     for axes in grid[-1]:
         axes.set_xlabel("time (s)")
     for column in grid.T:
@@ -203,7 +214,7 @@ def _control(drawn: Sequence[Drawn], window: tuple[float, float] | None = None) 
 
 def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
     """V on a log scale over at most `DECADES`; a V of zero throughout is said in words."""
-    values = [flight.values("lyapunov") for flight in drawn]
+    values = [flight.values("controller.lyapunov") for flight in drawn]
     found = span([value[value > 0.0] for value in values])
     if found is None:
         if span(values) is not None:

@@ -6,6 +6,7 @@ diverging flight does near its end does not set the scale of a panel; how far it
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle, islice, product
@@ -56,9 +57,15 @@ class Drawn(NamedTuple):
     width: float  # earlier flights are wider, so that both of two equal curves are seen
 
     def values(self, signal: str, column: int | None = None) -> Array:
-        """Samples of one column of a signal."""
+        """Samples of one column of a signal; NaN where the flight has no such signal."""
+        if not self.has(signal):
+            return np.full(len(self.time), np.nan)
         values = np.asarray(self.data[signal].values, dtype=float)
         return values if column is None else values[:, column]
+
+    def has(self, signal: str) -> bool:
+        """Whether the flight recorded a signal: a controller records what it has."""
+        return signal in self.data
 
     def unit_of(self, signal: str) -> str:
         """Unit of a signal in brackets, as it stands on an axis."""
@@ -71,10 +78,11 @@ class Drawn(NamedTuple):
 
     @property
     def onsets(self) -> dict[int, float]:
-        """Time in s at which the true loss of each rotor becomes non-zero."""
-        true = np.nan_to_num(np.asarray(self.data["loss_true"].values, dtype=float)) > 0.0
+        """Time in s at which the first fault of each rotor begins, as the scenario has it."""
+        scores = json.loads(self.data.attrs.get("scores", "{}"))
         rotors = (int(rotor) for rotor in self.data["rotor"].values)
-        return {r: float(self.time[seen.argmax()]) for r, seen in zip(rotors, true.T, strict=True) if seen.any()}
+        onsets = {rotor: scores.get(f"onset.{rotor}") for rotor in rotors}
+        return {rotor: float(onset) for rotor, onset in onsets.items() if onset is not None}
 
     @property
     def threshold(self) -> float | None:
@@ -152,9 +160,12 @@ def draw_panel(axes: Axes, panel: Panel, drawn: Sequence[Drawn], window: tuple[f
     """Draw the curves of a panel in a window of time, set its limits, mark fault onsets and ends of flights."""
     parts: list[Array] = []
     for curve in panel.curves:
-        once = curve.shared and _agree(drawn, curve)
+        having = [flight for flight in drawn if flight.has(curve.signal)]
+        if not having:
+            continue
+        once = curve.shared and _agree(having, curve)
         # The longest flight stands for all.
-        for flight in [max(drawn, key=lambda f: f.end)] if once else drawn:
+        for flight in [max(having, key=lambda f: f.end)] if once else having:
             time, values = _inside(flight, curve, window)
             colour = BLACK if once else _darker(flight.colour) if curve.shared else flight.colour
             style = {"color": colour, "linestyle": flight.line, "linewidth": flight.width} | curve.style

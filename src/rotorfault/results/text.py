@@ -77,18 +77,45 @@ def landing_rows(landing: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def summary_text(summary: dict[str, Any]) -> str:
-    """A flight's numbers, a line each."""
-    head = (
-        f"{summary['scenario']} flown by {summary['controller']} on {summary['plant']} ({summary['engine']} engine)"
-    )
+    """A flight's numbers, a line each; those of a lost flight say that they are of the time before."""
+    by = summary["controller"] + (f" ({summary['preset']})" if summary.get("preset") else "")
+    head = f"{summary['scenario']} flown by {by} on {summary['plant']} ({summary['engine']} engine)"
+    if not summary["survived"]:
+        head += (
+            f"\n  lost: the numbers are those of the {number(summary['end_time'], 's')} before it {_fate(summary)}"
+        )
     lines = rows(summary)
     width = max(len(label) for label, _ in lines)
     return "\n".join([head, *(f"  {label.ljust(width)}  {text}" for label, text in lines)])
 
 
+def _fate(summary: dict[str, Any]) -> str:
+    fates = {"tumbled": "tumbled", "diverged": "diverged", "ground": "hit the ground"}
+    return fates.get(summary["outcome"], "was interrupted")
+
+
+UNTIL_LOST = "*"
+"""Marks numbers of a flight that was lost, where they stand beside those of others."""
+
+
 def comparison(summaries: dict[str, dict[str, Any]]) -> list[list[str]]:
-    """Table of several flights: a header row, then one row per quantity."""
+    """Table of several flights: a header row, then one row per quantity.
+
+    Numbers of a flight that was lost are marked: they are of the time before, and small errors of a short flight say
+    nothing for it.
+    """
     labels = list(summaries)
     each = [dict(rows(summary)) for summary in summaries.values()]
+    lost = [not summary["survived"] for summary in summaries.values()]
     names = list(dict.fromkeys(name for one in each for name in one))
-    return [["", *labels], *([name, *(one.get(name, "-") for one in each)] for name in names)]
+    return [
+        ["", *labels],
+        *(
+            [name, *(_marked(one.get(name, "-"), name, gone) for one, gone in zip(each, lost, strict=True))]
+            for name in names
+        ),
+    ]
+
+
+def _marked(text: str, name: str, lost: bool) -> str:
+    return f"{text} {UNTIL_LOST}" if lost and name != "outcome" and text != "-" else text

@@ -78,7 +78,7 @@ class Part(Generic[B]):
         """Digest of the source, for a part from outside the package; empty for one of the package's own."""
         factory = self.factory
         home = getattr(factory, "__module__", type(factory).__module__)
-        return "" if foreign.is_own(home) else foreign.source_digest(factory)
+        return "" if foreign.is_own(home) else foreign.source_digest(getattr(factory, "kind", factory))
 
 
 def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
@@ -154,6 +154,8 @@ def part_from(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) 
 def _foreign(slot: Slot[B], place: str, allow: bool | Collection[str]) -> Kind[B]:
     foreign.require_allowed(place, allow, slot.registry.sort)
     part = foreign.load(place, slot.registry.sort)
+    if slot.adapt is not None and (adapted := slot.adapt(part)) is not None:
+        return adapted
     home = slot_of(part)
     if home is not slot or not callable(part):
         raise InputError(

@@ -6,6 +6,7 @@ Importing the package registers every controller, so that the registry is comple
 from rotorfault.autopilot.control.cascade import register_law
 from rotorfault.autopilot.control.ismc import Ismc
 from rotorfault.autopilot.control.protocol import CONTROLLER, ControlInputs, Controller, ControlOutput
+from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.autopilot.control.roismc import Roismc
 from rotorfault.autopilot.control.sdre import Sdre
 from rotorfault.autopilot.control.smc import Smc
@@ -15,4 +16,4 @@ register_law("smc", Smc)
 register_law("ismc", Ismc)
 register_law("sdre", Sdre)
 
-__all__ = ["CONTROLLER", "ControlInputs", "ControlOutput", "Controller"]
+__all__ = ["CONTROLLER", "ControlInputs", "ControlOutput", "Controller", "PythonController"]

@@ -14,12 +14,13 @@ from __future__ import annotations
 import traceback
 from typing import Any, ClassVar, NamedTuple, Protocol
 
-from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
+from rotorfault.autopilot.control.protocol import CONTROLLER, ControlInputs, Controller, ControlOutput
 from rotorfault.base.errors import InputError
+from rotorfault.base.registry import Kind
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.block import Context, NoSettings, Nothing, Record
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle
 
@@ -100,6 +101,34 @@ def _checked(demand: object, name: str) -> Wrench | PerRotor:
     if isinstance(demand, PerRotor):
         return PerRotor(first, second, third, fourth)
     return Wrench(first, Vec3(second, third, fourth))
+
+
+class PythonKind:
+    """A class of plain Python controllers as a kind of controller, to be named in a scenario.
+
+    Parameters
+    ----------
+    kind : type
+        Made without arguments; has ``update``.
+    """
+
+    Settings = NoSettings
+
+    def __init__(self, kind: type[Any]) -> None:
+        self.kind = kind
+        self.__doc__, self.__module__ = kind.__doc__, kind.__module__
+
+    def __call__(self, settings: Any, /) -> PythonController:
+        """Make one and wrap it."""
+        return PythonController(self.kind())
+
+
+def _adapted(thing: object) -> Kind[Controller[Any, Any]] | None:
+    """A class with ``update`` as a kind of controller; None for anything else."""
+    return PythonKind(thing) if isinstance(thing, type) and callable(getattr(thing, "update", None)) else None
+
+
+CONTROLLER.adapt = _adapted
 
 
 def as_controller(given: Any) -> Controller[Any, Any]:

@@ -71,7 +71,8 @@ def errors(ours: Result, theirs: Result, *matched: Result) -> list[Reading]:
             return whole
         pairs = [(ours.summary["position_mse"][a], other.summary["position_mse"][a]) for a in AXES]
         if kind:
-            pairs += [(ours.summary[kind][a], other.summary[kind][a]) for a in ANGLES]
+            first, second = (result.summary.get(kind) or result.extra[kind] for result in (ours, other))
+            pairs += [(first[a], second[a]) for a in ANGLES]
         below = sum(a < b for a, b in pairs)
         told = f"{whole[0].measured} m^2; lower on {below} of {len(pairs)} coordinates"
         return [Reading(name, told, whole[0].holds and 2 * below > len(pairs))]

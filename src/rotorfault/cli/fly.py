@@ -1,0 +1,132 @@
+"""The commands `rotorfault fly` and `rotorfault compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotorfault.base.errors import InputError
+from rotorfault.cli.app import AllowCode, Assignments, app, finish
+
+if TYPE_CHECKING:
+    from rotorfault.flight.flight import Flight
+    from rotorfault.scenario.scenario import Scenario
+
+
+@app.command()
+def fly(
+    scenario: Annotated[
+        str | None, typer.Argument(help="Built-in scenario (see 'rotorfault list') or a TOML file.")
+    ] = None,
+    controller: Annotated[
+        str | None, typer.Option(help="Registered controller, or FILE.py:NAME for a class of your own.")
+    ] = None,
+    preset: Annotated[str | None, typer.Option(help="Preset of the controller: paper, tuned ...")] = None,
+    assignments: Assignments = None,
+    engine: Annotated[str | None, typer.Option(help="simd, numpy or python; the fastest installed.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of sensor noise and gusts.")] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for results; results/SCENARIO-CONTROLLER if not given.")
+    ] = None,
+    repeat: Annotated[
+        Path | None, typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
+    ] = None,
+    allow_code: AllowCode = False,
+) -> None:
+    """Fly a scenario: print what happened, write flight.nc, summary.json and figures.
+
+    Every part may be one of your own: --set wind.kind=FILE.py:NAME, and --set wind.KEY=VALUE for its settings.
+
+    Example: rotorfault fly paper-set-point --controller smc --set wind.kind=none --out results/calm
+    """
+    from rotorfault.base.files import output_folder
+    from rotorfault.flight.fly import prepare
+    from rotorfault.flight.fly import repeat as fly_again
+    from rotorfault.scenario.overrides import parse_overrides
+
+    if repeat is not None:
+        if any(value is not None for value in (scenario, controller, preset, assignments, seed)):
+            raise InputError("--repeat takes scenario, controller and settings from the file; give it alone")
+        folder = output_folder(out or Path("results") / "repeat")
+        finish(fly_again(repeat, engine, allow_code=allow_code), folder, figures)
+        return
+    if scenario is None:
+        raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
+    settings = parse_overrides(assignments or [])
+    if preset is not None:
+        settings = {"controller.preset": preset, **settings}
+    checked = prepare(scenario, controller, settings, seed, allow_code)
+    folder = out or Path("results") / f"{checked.name}-{_name(checked)}".replace("/", "_")
+    output_folder(folder)
+    _warn(checked)
+    finish(_flown(checked, engine), folder, figures)
+
+
+def _name(scenario: Scenario) -> str:
+    """What the controller of a scenario is called."""
+    from rotorfault.autopilot.control import CONTROLLER
+
+    return scenario[CONTROLLER].kind.rpartition(":")[2]
+
+
+def _warn(scenario: Scenario) -> None:
+    """Say what is likely not meant, before it is flown."""
+    from rotorfault.analysis.sampling_check import sampled_data_warnings
+    from rotorfault.model.block import Context
+    from rotorfault.plant import FAULT
+
+    for warning in sampled_data_warnings(scenario):
+        typer.echo(f"warning: {warning}", err=True)
+    vehicle = scenario.mismatch.applied(scenario.vehicle.vehicle)
+    for number, part in enumerate(scenario.all(FAULT)):
+        fault = part.make()
+        onset = fault.onset(fault.parameters(Context(vehicle, scenario.period)))
+        if onset >= scenario.duration:
+            text = f"fault.{number} sets in at {onset:g} s, after the end of the flight at {scenario.duration:g} s"
+            typer.echo(f"warning: {text}", err=True)
+
+
+def _flown(scenario: Scenario, engine: str | None) -> Flight:
+    """Fly; whatever goes wrong in code of the user's own is told in one line."""
+    from rotorfault.base.foreign import in_one_line
+    from rotorfault.flight.fly import fly as fly_scenario
+
+    own = [part for _, part in scenario.parts() if part.source]
+    try:
+        return fly_scenario(scenario, engine=engine)
+    except InputError:
+        raise
+    except Exception as error:
+        if not own:
+            raise
+        names = ", ".join(part.kind for part in own)
+        hint = "" if "update" in str(error) else "; a block keeps to the scalar style of docs/own-parts.md"
+        raise InputError(f"{names}: {in_one_line(error)}{hint}") from error
+
+
+@app.command()
+def compare(
+    flights: Annotated[list[Path], typer.Argument(metavar="A.nc B.nc ...", help="Two or more flight files.")],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for figures.")] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+) -> None:
+    """Compare flights: one table, and figures with all of them together.
+
+    Example: rotorfault compare results/a/flight.nc results/b/flight.nc --out results/a-b
+    """
+    from rotorfault.base.files import output_folder
+    from rotorfault.report import comparison
+
+    if len(flights) < 2:
+        raise InputError(f"got {len(flights)} flight file; compare needs at least two")
+    folder = out or Path("results") / "compare"
+    if figures:
+        output_folder(folder)
+    loaded = comparison.labelled(flights)
+    comparison.print_table(loaded)
+    if figures:
+        written = comparison.draw(loaded, folder)
+        typer.echo(f"\nwrote {', '.join(path.name for path in written)} to {folder}")

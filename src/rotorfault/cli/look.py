@@ -1,0 +1,83 @@
+"""The commands that fly nothing: `list`, `new`, `check` and `trim`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorfault.base.foreign import is_place
+from rotorfault.cli.app import AllowCode, app
+
+
+@app.command("list")
+def list_parts(
+    what: Annotated[str | None, typer.Argument(help="Only this: controllers, vehicles, scenarios ...")] = None,
+) -> None:
+    """List everything registered, one line each."""
+    from rotorfault.cli import catalogue
+
+    typer.echo(catalogue.text(what))
+
+
+@app.command()
+def new(
+    what: Annotated[str, typer.Argument(metavar="vehicle|scenario", help="What to write.")],
+    name: Annotated[str, typer.Argument(help="Its name; the file becomes NAME.toml.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path("."),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
+) -> None:
+    """Write a commented TOML file that works, to start from."""
+    from rotorfault.cli import catalogue
+
+    path = catalogue.write_new(what, name, out, force)
+    typer.echo(f"wrote {path}; check it with: rotorfault check {path}")
+
+
+@app.command()
+def check(
+    file: Annotated[
+        str,
+        typer.Argument(help="Vehicle or scenario TOML file, a flight.nc, or FILE.py:NAME for a part of your own."),
+    ],
+    allow_code: AllowCode = False,
+) -> None:
+    """Validate a file: one line that says what is wrong and how to mend it, or what it holds.
+
+    A part of your own goes through what every part of rotorfault goes through: all engines give the same numbers, no
+    number of its settings is baked into its code, it fails where its inputs are no numbers.
+    """
+    from rotorfault.cli import catalogue
+
+    if is_place(file) and ".py:" in file:
+        from rotorfault.flight.check_block import check_block
+
+        typer.echo(str(check_block(file)))
+        return
+    typer.echo(catalogue.check(Path(file), allow_code))
+
+
+@app.command()
+def trim(
+    vehicle: Annotated[str, typer.Argument(help="Built-in vehicle or a TOML file.")],
+    controller: Annotated[
+        str, typer.Option(help="Registered controller, or FILE.py:NAME for a class of your own.")
+    ] = "roismc",
+    preset: Annotated[str | None, typer.Option(help="Preset of the controller.")] = None,
+    period: Annotated[float, typer.Option(help="Sampling period [s].")] = 0.001,
+    losses: Annotated[
+        list[str] | None,
+        typer.Option("--loss", metavar="R=VALUE", help="Loss of rotor R, 0 to 1; one for each rotor at most."),
+    ] = None,
+) -> None:
+    """Print hover, what losses leave of it, linearisation, closed-loop poles, gain and delay margins.
+
+    Losses matter to the block "attainable hover" alone: whether hover is still possible, whoever controls.
+
+    Example: rotorfault trim paper --controller smc --loss 1=0.4
+    """
+    from rotorfault.analysis.trim import trim_report
+    from rotorfault.cli.losses import parse_losses
+
+    typer.echo(trim_report(vehicle, controller, preset, period, parse_losses(losses or [])).text())

@@ -1,0 +1,130 @@
+"""The commands of studies and measurements: `paper`, `tune` and `bench`."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rotorfault.base.errors import InputError, MissingExtraError
+from rotorfault.cli.app import app
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for everything.")] = Path("results/paper"),
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out ablation and sensitivity.")] = False,
+    case: Annotated[str | None, typer.Option(help="Fly this case alone: set-point, sinusoid or square.")] = None,
+    controller: Annotated[str | None, typer.Option(help="Fly this controller alone: smc or roismc.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if not given.")] = None,
+) -> None:
+    """Reproduce the paper: every case, figure, table and claim, with a verdict on each claim.
+
+    Writes report.html, claims.json, table1.csv, ablation.csv, sensitivity.csv, figures/ and flights/. What is done
+    is not flown again; an interrupted run goes on where it was.
+
+    Example: rotorfault paper --case sinusoid --controller roismc
+    """
+    from rotorfault.studies.paper import study
+
+    if case is not None or controller is not None:
+        for result in study.fly_part(out, case, controller, workers):
+            typer.echo(f"{result.run.id}: {study.line(result)}")
+        typer.echo(f"flights are in {out / 'flights'}; the whole paper: rotorfault paper --out {out}")
+        return
+    try:
+        done = study.reproduce(out, quick, workers)
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; what is done is kept in {out}, start again to go on", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(study.text(done))
+
+
+@app.command()
+def tune(
+    controller: Annotated[str, typer.Argument(help="Registered controller with a search space: roismc, smc, ...")],
+    generations: Annotated[int, typer.Option(min=1, help="Generations of the search.")] = 100,
+    population: Annotated[int, typer.Option(min=4, help="Candidates per generation.")] = 24,
+    seed: Annotated[int, typer.Option(min=1, help="Seed of the optimiser.")] = 1,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key of all training flights; may be repeated."),
+    ] = None,
+    name: Annotated[str, typer.Option(help="Name of the preset to write.")] = "tuned",
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TOML file to write; printed if not given.")
+    ] = None,
+) -> None:
+    """Search a controller's gains by CMA-ES on training flights; same budget and objective for all.
+
+    Needs the extra 'tune'. Ctrl-C ends the search and gives the best so far.
+
+    Example: rotorfault tune smc --generations 100 --out smc.toml
+    """
+    if importlib.util.find_spec("cma") is None:
+        raise MissingExtraError("tuning needs the package cma, which is not installed; install rotorfault[tune]")
+    from rotorfault.base.files import output_folder, write_atomically
+    from rotorfault.base.progress import Bar
+    from rotorfault.scenario.overrides import parse_overrides
+    from rotorfault.tuning import search
+
+    settings = parse_overrides(assignments or [])
+    if out is not None:
+        output_folder(out.parent)
+    with Bar(f"tuning {controller}", generations, "generations") as bar:
+        tuned = search.tune(controller, generations, population, seed, settings, lambda done, _: bar.update(done))
+    text = search.as_toml(tuned, name)
+    if out is None:
+        typer.echo(text)
+    else:
+        write_atomically(out, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        typer.echo(f"wrote {out}, objective {tuned.record['objective']:g}")
+
+
+@app.command()
+def bench(
+    with_peers: Annotated[
+        bool, typer.Option("--peers", help="Also crazyflow, RotorPy and l2f, each installed on first use (8 GB).")
+    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer and shorter repetitions: half a minute.")] = False,
+    as_json: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here too.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw error against cost (.png, .svg, .pdf); needs heyoka.")
+    ] = None,
+) -> None:
+    """Measure speed and accuracy on this machine: flights, batches, Riccati solvers, latency, and other simulators.
+
+    Takes some minutes on an idle machine; anything else that runs meanwhile skews it. Keys that stay:
+    batch.10000.steps_per_s_per_core, batch.10000.simulated_s_per_s_per_core, peers.crazyflow.steps_per_s_per_core.
+
+    Example: rotorfault bench --peers --json bench.json --figure error-cost.png
+    """
+    from rotorfault.base.files import output_folder
+
+    for path in (as_json, figure):
+        if path is not None:
+            output_folder(path.parent)
+    if as_json is not None and as_json.is_dir():
+        raise InputError(f"--json {as_json}: is a folder; give a file")
+    if figure is not None:
+        if figure.suffix not in (".png", ".svg", ".pdf"):
+            raise InputError(f"--figure {figure}: allowed: a file that ends in .png, .svg or .pdf")
+        if importlib.util.find_spec("heyoka") is None:
+            raise MissingExtraError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
+    # Before NumPy is loaded: with problems this small the threads of BLAS only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from rotorfault.bench import study
+
+    found = study.run(with_peers, quick, lambda line: typer.echo(f"measuring: {line}", err=True))
+    typer.echo(study.text(found))
+    if as_json is not None:
+        study.save(found, as_json)
+        typer.echo(f"\nwrote {as_json}")
+    if figure is not None:
+        study.draw(found, figure)
+        typer.echo(f"wrote {figure}")
