@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -49,7 +48,7 @@ def entries() -> dict[str, dict[str, str]]:
         known = presets(name)
         found["controllers"][name] += f" Presets: {', '.join(known)}." if known else ""
     found["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
-    found["engines"] = {name: about for name, (_, about) in ENGINES.items()}
+    found["engines"] = dict(ENGINES)
     return found
 
 
@@ -110,7 +109,8 @@ def check(path: Path) -> str:
     """
     if path.suffix == ".nc":
         # xarray takes longer to load than all the rest, and only flight files need it.
-        dataset = importlib.import_module("rotorfault.results.dataset")
+        from rotorfault.results import dataset
+
         data = dataset.read_netcdf(path)
         scenario = scenario_from(dataset.configuration(data, path), str(path))
         return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
