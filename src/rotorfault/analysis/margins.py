@@ -25,9 +25,10 @@ from scipy.optimize import brentq
 from rotorfault.analysis.linearisation import AXES, LinearLoop
 from rotorfault.maths.arrays import Array, Complex
 
-# Loop gains outside this range are not looked at: margins beyond it mean nothing, and there rounding rules.
+# Loop gains outside this range are not looked at. Our choice: no actuator is wrong by a factor of 1e5, and the loop
+# transfer, a small difference of large numbers, is rounding there. A narrower range would miss no margin that matters.
 LOOP_GAIN_RANGE = (1e-5, 1e5)
-GRID = 2000
+GRID = 2000  # frequencies, so some 300 per decade: far more than a crossing needs between two resonances
 
 
 class Margins(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import sys
 import time
 from collections.abc import Callable
@@ -68,15 +67,17 @@ class Bar:
 
 def _progress(unit: str) -> Progress:
     # rich is loaded for a bar that is shown; most computations are done before.
-    rich, console = (importlib.import_module(f"rich.{name}") for name in ("progress", "console"))
-    return rich.Progress(  # type: ignore[no-any-return]
-        rich.TextColumn("{task.description}"),
-        rich.BarColumn(),
-        rich.TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
-        rich.TextColumn("{task.fields[rate]}"),
-        rich.TimeRemainingColumn(),
-        rich.TextColumn("{task.fields[note]}"),
-        console=console.Console(stderr=True),
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
         transient=True,
     )
 

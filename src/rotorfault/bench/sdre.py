@@ -9,7 +9,6 @@ compiled for any weights: they are inputs like the rates.
 
 from __future__ import annotations
 
-import importlib
 import os
 import statistics
 import time
@@ -241,7 +240,7 @@ def _worst_residual(dense: list[_Dense], costs: list[Array]) -> float:
 
 def _packages(dense: list[_Dense], repeats: int) -> dict[str, dict[str, float] | None]:
     """Time and residual of each packaged solver, None for those that are not installed."""
-    ctrlsys, control, slycot = map(_module, ("ctrlsys", "control", "slycot"))
+    ctrlsys, control = _ctrlsys(), _control_with_slycot()
 
     def scipy(d: _Dense) -> Any:
         return solve_continuous_are(d.A, d.B, d.Q, d.R)
@@ -257,9 +256,9 @@ def _packages(dense: list[_Dense], repeats: int) -> dict[str, dict[str, float] |
 
     solvers = (
         (SCIPY, scipy, True),
-        ("python-control with slycot", python_control, bool(control and slycot)),
-        ("ctrlsys sb02md (Schur)", sb02md, bool(ctrlsys)),
-        ("ctrlsys sb02pd (sign function)", sb02pd, bool(ctrlsys)),
+        ("python-control with slycot", python_control, control is not None),
+        ("ctrlsys sb02md (Schur)", sb02md, ctrlsys is not None),
+        ("ctrlsys sb02pd (sign function)", sb02pd, ctrlsys is not None),
     )
     return {name: _package(solve, dense, repeats) if installed else None for name, solve, installed in solvers}
 
@@ -269,12 +268,23 @@ def _package(solve: Callable[[_Dense], Any], dense: list[_Dense], repeats: int) 
     return {"us": us, "residual": _worst_residual(dense, [np.asarray(solve(each)) for each in dense])}
 
 
-def _module(name: str) -> Any:
-    """A package that need not be there, or None."""
+def _ctrlsys() -> Any:
+    """SLICOT through ctrlsys, or None where it is not installed."""
     try:
-        return importlib.import_module(name)
+        import ctrlsys
     except ImportError:
         return None
+    return ctrlsys
+
+
+def _control_with_slycot() -> Any:
+    """python-control, or None where it or slycot is not installed."""
+    try:
+        import control
+        import slycot  # noqa: F401  control calls it
+    except ImportError:
+        return None
+    return control
 
 
 def _summary(solvers: dict[str, dict[str, float] | None]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import json
 import os
@@ -16,7 +15,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.files import write_atomically
 from rotorfault.base.progress import Say
 from rotorfault.base.text_table import table_lines
-from rotorfault.bench import flights, latency, peers
+from rotorfault.bench import accuracy, flights, latency, peers, sdre
 from rotorfault.bench.peak import peak_flops
 from rotorfault.engine import have_simd
 from rotorfault.engine.machine import Machines
@@ -72,12 +71,12 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     best = max(part["steps_per_s_per_core"] for part in found["batch"].values())
     found["operations"] = _operations(best, peak)
     say("Riccati solvers")
-    found["sdre"] = importlib.import_module("rotorfault.bench.sdre").measure(quick)
+    found["sdre"] = sdre.measure(quick)
     say("latency of a control update")
     found["latency"] = latency.measure(quick)
     found["accuracy"] = None
     if importlib.util.find_spec("heyoka") is not None:
-        found["accuracy"] = importlib.import_module("rotorfault.bench.accuracy").measure(quick, say)
+        found["accuracy"] = accuracy.measure(quick, say)
     found["peers"] = peers.measure(list(peers.PEERS), quick, cores, say) if with_peers else {}
     return found
 
@@ -210,7 +209,10 @@ def draw(found: dict[str, Any], path: Path) -> None:
     if found["accuracy"] is None:
         raise InputError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
     peers_there = {name: peer for name, peer in found["peers"].items() if "error" not in peer}
-    figure = importlib.import_module("rotorfault.bench.accuracy_figure").draw(found["accuracy"], peers_there or None)
+    # matplotlib takes a second to load, which the measurements need not spend.
+    from rotorfault.bench import accuracy_figure
+
+    figure = accuracy_figure.draw(found["accuracy"], peers_there or None)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=150))
 
 

@@ -33,7 +33,7 @@ def entries() -> dict[str, dict[str, str]]:
             known = slot.presets(name) if slot.presets is not None else {}
             groups[slot.group][name] += f" Presets: {', '.join(known)}." if known else ""
     groups["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
-    groups["engines"] = {name: about for name, (_, about) in ENGINES.items()}
+    groups["engines"] = dict(ENGINES)
     return groups
 
 

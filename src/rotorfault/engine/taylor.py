@@ -14,7 +14,7 @@ So faults must set in on sampling instants, and motion within a period must be s
 
 from __future__ import annotations
 
-import importlib
+from types import ModuleType
 from typing import Any, cast, final
 
 from rotorfault.base.errors import InputError
@@ -104,11 +104,13 @@ class _TaylorPlant:
         return PlantState(plant.model.after_step(body), rotors)
 
 
-def _heyoka() -> Any:
+def _heyoka() -> ModuleType:
     try:
-        return importlib.import_module("heyoka")
+        # The package is not there on every system.
+        import heyoka
     except ImportError:
         raise InputError(
             "Taylor series need heyoka, not installed; pip install 'rotorfault[bench]' "
             "(it exists for Linux on x86-64 and aarch64 only)"
         ) from None
+    return heyoka  # type: ignore[no-any-return]

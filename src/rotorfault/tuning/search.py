@@ -25,7 +25,9 @@ from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.space import SPACES, settings_at
 from rotorfault.tuning.training import objective, training_groups
 
-SPREAD = 0.15  # initial standard deviation, as a share of each range
+# Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which is
+# known to fly, and not at the bounds.
+SPREAD = 0.15
 
 
 class Tuned(NamedTuple):
