@@ -64,7 +64,7 @@ def _instant(batch: Batch) -> tuple[Any, ...]:
     truth = loop.plant.observe(state.plant, held, air, 0.0, loop.plant_numbers(numbers))
     inputs = SensorInputs(0.0, truth.state, truth.specific_force_B)
     readings = loop.sensors.step(state.truth.sensors, inputs, numbers.parts.sensors, numbers.period)[1]
-    reference = unflatten(loop.drive(), batch.reference[0].tolist()).reference
+    reference = unflatten(loop.drive().reference, batch.reference[0].tolist())
     return state.autopilot, readings, reference, numbers.belief, numbers.parts
 
 

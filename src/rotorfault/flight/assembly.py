@@ -200,7 +200,9 @@ def initial_state(
     loop: ClosedLoop, start: Start, reference: Array, seeds: tuple[tuple[int, int], ...], parameters: LoopParameters
 ) -> LoopState:
     """State before the first step, for one flight or, with leaves of N numbers, for N."""
-    drive = unflatten(loop.drive(), reference[0].tolist())
+    drive = loop.drive()
+    wanted, own = unflatten((drive.reference, drive.own), reference[0].tolist())
+    drive = drive._replace(reference=wanted, own=own)
     # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
     # must begin the same alone and in any batch.
     many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=first_normals(loop, seeds))
