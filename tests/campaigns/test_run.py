@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from campaign_studies import TINY
+from gates import needs_simd
 from places import SOURCE
 
 import rotorfault
@@ -25,9 +26,8 @@ from rotorfault.campaigns.replay import identifier_of, replay
 from rotorfault.campaigns.sampling.plan import Flights, drawn, identified, identifier, next_round, seeds
 from rotorfault.campaigns.studies import study_names
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
-from rotorfault.engine import have_simd
 
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+pytestmark = needs_simd
 
 
 def tiny(**tables: Any) -> Study:
