@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 from campaign_studies import TINY
+from gates import needs_simd
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns import run
 from rotorfault.campaigns.sampling.plan import Flights
 from rotorfault.campaigns.study import Study, study_from
-from rotorfault.engine import have_simd
 
 distributed = pytest.importorskip("distributed")
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+pytestmark = needs_simd
 
 
 @pytest.fixture(scope="module")

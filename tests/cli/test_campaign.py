@@ -11,11 +11,10 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from gates import needs_simd
 from places import SOURCE
 
-from rotorfault.engine import have_simd
-
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+pytestmark = needs_simd
 STUDY = """
 name = "tiny"
 scenario = "hover-fault"

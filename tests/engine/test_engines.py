@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from engine_flights import Array, assert_same, case_one, every_engine, run, short
+from gates import needs_simd
 
 import rotorfault
 from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings, limited_force
@@ -66,9 +67,9 @@ def test_late_measurements_fly_the_same_on_all_engines(engine: str) -> None:
     assert_same(run(late, engine).signals, run(late, "python").signals)
 
 
+@needs_simd
 def test_noise_crosses_chunks_the_same_on_all_engines() -> None:
     """More steps than are drawn at a time."""
-    pytest.importorskip("heyoka")
     long = short(duration=0.005 * (CHUNK + 40))
     assert_same(run(long, "python").signals, run(long, "simd").signals)
 
@@ -87,10 +88,10 @@ def test_without_llvmlite_the_other_engines_serve(monkeypatch: pytest.MonkeyPatc
         load_engine("simd")
 
 
+@needs_simd
 @pytest.mark.parametrize("period", [0.003, 0.01])
 def test_many_integration_steps_in_a_period_agree_too(period: float) -> None:
     """The engine then compiles the sampling instant and the integration step apart."""
-    pytest.importorskip("heyoka")
     settings = {"duration": 2.4, "period": period, "diagnosis.poles": [60.0, 80.0]}
     python = rotorfault.fly("paper-set-point", settings=settings, engine="python")
     simd = rotorfault.fly("paper-set-point", settings=settings, engine="simd")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.scenario.scenario import Scenario
@@ -76,8 +77,8 @@ def good(flight: rf.Flight) -> bool:
     return flight.outcome.survived and settled and undisturbed and right
 
 
+@needs_simd
 def test_at_least_95_of_100_neighbours_do_as_well() -> None:
-    pytest.importorskip("heyoka", reason="a hundred flights take minutes without it")
     base = rf.load_scenario("paper-set-point", {"duration": 8.0, "record_period": 0.01})
     flights = rf.fly_all([rf.neighbour(base, seed=i) for i in range(NEIGHBOURS)])
     assert sum(good(flight) for flight in flights) >= 95

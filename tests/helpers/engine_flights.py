@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gates import needs_simd
 from numpy.typing import NDArray
 
-from rotorfault.engine import ENGINES, have_simd, load_engine
+from rotorfault.engine import ENGINES, load_engine
 from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.flight.assembly import assemble
 from rotorfault.model.telemetry import SIGNAL_NAMES
@@ -18,7 +19,7 @@ from rotorfault.scenario.library import load_scenario
 Array = NDArray[np.float64]
 POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)
 SPREAD = 5e-9  # relative, over all signals: rates and switching inputs are large and steep
-_NEEDS = {"simd": [pytest.mark.skipif(not have_simd(), reason="needs llvmlite")]}
+_NEEDS = {"simd": [needs_simd]}
 every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
 
 

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gates import needs_simd
 from numpy.typing import NDArray
 from scipy import linalg, signal
 
 from rotorfault.base.errors import InputError
-from rotorfault.engine import have_simd, load_engine
+from rotorfault.engine import load_engine
 from rotorfault.engine.batch import CHUNK, drive_rows, no_watch
 from rotorfault.engine.noise import FIRST_GUST, GUSTS, SENSOR_NOISE, Noise
 from rotorfault.engine.structure import structure
@@ -33,7 +34,6 @@ WIND = slice(SIGNAL_NAMES.index("wind.x"), SIGNAL_NAMES.index("wind.x") + 3)
 AXES = ("along", "across", "up")
 MEAN = (6.0, -8.0, 0.0)  # m/s: 10 m/s along (0.6, -0.8)
 H, W20 = 20.0, 15.0  # m, m/s
-needs_llvmlite = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
 each_axis = pytest.mark.parametrize("axis", range(3), ids=AXES)
 
 
@@ -263,7 +263,7 @@ def run(flown: Scenario, engine: str) -> Array:
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "noisy"])
-@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_llvmlite), "numpy", "python"])
+@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_simd), "numpy", "python"])
 def test_a_flight_does_not_depend_on_its_batch(engine: str, sensors: str) -> None:
     base = short(sensors=sensors)
     alone = run(base, engine)
@@ -277,7 +277,7 @@ def test_a_flight_does_not_depend_on_its_batch(engine: str, sensors: str) -> Non
     assert all(np.abs(together[:, WIND, k] - alone[:, WIND]).max() > 0.1 for k in (0, 1, 3, 4))
 
 
-@needs_llvmlite
+@needs_simd
 @pytest.mark.parametrize("step", [0.005, 0.0025, 0.001])
 def test_compiled_it_is_the_same_flight(step: float) -> None:
     """One function for the period, or two where it has many integration steps; over more than one chunk of noise."""
@@ -290,7 +290,7 @@ def test_compiled_it_is_the_same_flight(step: float) -> None:
     assert worst.max() <= 5e-9, SIGNAL_NAMES[int(np.argmax(worst))]
 
 
-@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_llvmlite), "python"])
+@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_simd), "python"])
 def test_the_air_moves_on_once_in_a_sampling_period(engine: str) -> None:
     """However many integration steps there are in it."""
     winds = [run(short(step=0.005 / n, duration=0.1), engine)[:, WIND] for n in (1, 2, 5)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,17 +31,14 @@ LAZY = {
 # from mypy and from these tests what is imported.
 BY_NAME = {
     "rotorfault": "the table of public names",
-    "rotorfault.reference.sources": "a function that the user names",
+    "rotorfault.base.foreign": "code that the user names",
 }
-# To become imports inside functions.
-NOT_YET = {
-    "rotorfault.campaigns.api",
-    "rotorfault.campaigns.run",
-    "rotorfault.cli.main",
-    "rotorfault.flight.flight",
-    "rotorfault.flight.many",
-}
-NUMBER_TYPES = {"heyoka", "casadi"}
+# Folders and files that may know the library of a number type, or the compiler.
+HOMES = {"heyoka": ("maths/scalar.py", "engine"), "casadi": ("maths/scalar.py", "engine"), "llvmlite": ("engine",)}
+# Python beside the package.
+FOLDERS = ("benchmarks", "examples", "tests", "tools")
+OTHERS = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
+TESTS = [path for path in OTHERS if path.is_relative_to(ROOT / "tests")]
 
 
 def module_name(path: Path) -> str:
@@ -131,23 +129,133 @@ def test_modules_are_loaded_by_name_only_where_the_name_is_data() -> None:
         return {node.attr for node in nodes if isinstance(node, ast.Attribute)} | imported
 
     loading = {module for module, path in MODULES.items() if names(path) & {"import_module", "__import__"}}
-    assert loading - NOT_YET == set(BY_NAME)
+    assert loading == set(BY_NAME)
+
+
+def libraries(tree: ast.AST, module: str, path: Path) -> set[str]:
+    """Libraries that a module uses: imported by a statement or by name, named, or taken from `sys.modules`."""
+    found = {name.partition(".")[0] for name in imports(tree, module, path)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            found.add(node.id)
+        elif isinstance(node, ast.Call) and called(node) in ("import_module", "__import__"):
+            found |= {name.partition(".")[0] for name in texts(node.args)}
+        elif isinstance(node, ast.Subscript) and ast.unparse(node.value) == "sys.modules":
+            found |= set(texts([node.slice]))
+    return found
+
+
+def called(call: ast.Call) -> str:
+    return ast.unparse(call.func).rpartition(".")[2]
+
+
+def texts(nodes: list[ast.expr]) -> list[str]:
+    return [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
 
 
 @pytest.mark.parametrize("path", FILES, ids=module_name)
-def test_number_types_are_known_in_one_place(path: Path) -> None:
-    """Only scalar.py and the engines import heyoka or CasADi, or use names of theirs."""
-    if path.name == "scalar.py" or "engine" in path.relative_to(SOURCE).parts:
-        return
-    tree = ast.parse(path.read_text())
-    imported = {name.partition(".")[0] for name in imports(tree, module_name(path), path)}
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    assert not (imported | used) & NUMBER_TYPES
+def test_number_types_and_compiler_are_known_in_few_places(path: Path) -> None:
+    """The equations know neither heyoka nor CasADi nor LLVM; NumPy they know as one number type among others."""
+    place, used = path.relative_to(SOURCE), libraries(ast.parse(path.read_text()), module_name(path), path)
+    for library, homes in HOMES.items():
+        if not {place.as_posix(), place.parts[0]} & set(homes):
+            assert library not in used, library
 
 
-@pytest.mark.parametrize("path", FILES, ids=module_name)
-def test_files_stay_short(path: Path) -> None:
-    assert len(path.read_text().splitlines()) <= 400
+def test_libraries_are_seen_however_they_are_named() -> None:
+    for code in (
+        "import heyoka as hy",
+        "from heyoka import expression",
+        "def f():\n    from heyoka import core",
+        "hy = importlib.import_module('heyoka')",
+        "hy = import_module('heyoka.core')",
+        "hy = sys.modules['heyoka']",
+        "hy = heyoka.expression",
+    ):
+        assert "heyoka" in libraries(ast.parse(code), "rotorfault.plant.plant", Path("plant.py")), code
+    asked = "if importlib.util.find_spec('heyoka') is None:\n    raise InputError('needs heyoka')"
+    assert "heyoka" not in libraries(ast.parse(asked), "rotorfault.plant.plant", Path("plant.py"))
+    used = {
+        place: libraries(ast.parse((SOURCE / place).read_text()), "rotorfault", SOURCE / place)
+        for place in ("maths/scalar.py", "engine/taylor.py", "engine/native.py")
+    }
+    assert used["maths/scalar.py"] >= {"heyoka", "casadi"}
+    assert "heyoka" in used["engine/taylor.py"]
+    assert "llvmlite" in used["engine/native.py"]
+
+
+# ------------------------------------------------------------------------------------------------------------ tests
+
+
+@functools.cache
+def integrators() -> frozenset[str]:
+    """Modules that integrate with heyoka, directly or through others."""
+    edges, found = graph(), {"rotorfault.engine.taylor"}
+    while more := {name for name, used in edges.items() if used & found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def needless_gates(tree: ast.Module) -> list[int]:
+    """Lines that ask whether heyoka is there on behalf of code that uses neither it nor what integrates with it."""
+    series = {
+        alias.asname or alias.name
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if {node.module, f"{node.module}.{alias.name}"} & integrators()
+    }
+    found = []
+    for part in tree.body:
+        calls = [node for node in ast.walk(part) if isinstance(node, ast.Call)]
+        gates = [c for c in calls if called(c) in ("importorskip", "find_spec") and "heyoka" in texts(c.args)]
+        bound = {
+            target.id
+            for node in ast.walk(part)
+            if isinstance(node, ast.Assign) and node.value in gates and called(node.value) == "importorskip"
+            for target in node.targets
+            if isinstance(target, ast.Name)
+        }
+        judged = part if isinstance(part, ast.FunctionDef | ast.ClassDef) else tree
+        used = {n.id for n in ast.walk(judged) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+        if not used & (bound | series):
+            found += [gate.lineno for gate in gates]
+    return found
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_only_what_uses_heyoka_asks_for_it(path: Path) -> None:
+    """What needs the compiled engine asks for llvmlite; heyoka has wheels for Linux only, and tests would be lost."""
+    assert not needless_gates(ast.parse(path.read_text()))
+
+
+def test_needless_gates_are_seen() -> None:
+    needless = (
+        "def test():\n    pytest.importorskip('heyoka')\n    run('simd')",
+        "def test():\n    hy = pytest.importorskip('heyoka')\n    run('simd')",
+        "def test():\n    if importlib.util.find_spec('heyoka') is not None:\n        run('simd')",
+        "@pytest.mark.skipif(find_spec('heyoka') is None, reason='')\ndef test():\n    run('simd')",
+        "pytestmark = pytest.mark.skipif(find_spec('heyoka') is None, reason='')\ndef test():\n    run('simd')",
+        "from rotorfault.engine import load_engine as e\ndef test():\n    pytest.importorskip('heyoka')\n    e()",
+    )
+    for code in needless:
+        assert len(needless_gates(ast.parse(code))) == 1, code
+    for code in (
+        "def test():\n    hy = pytest.importorskip('heyoka')\n    hy.expression('x')",
+        "from rotorfault.engine.taylor import fly_taylor\n"
+        "def test():\n    pytest.importorskip('heyoka')\n    fly_taylor()",
+        "def test():\n    pytest.importorskip('casadi')",
+    ):
+        assert not needless_gates(ast.parse(code)), code
+
+
+# ------------------------------------------------------------------------------------------------------------ files
+
+
+def test_files_stay_short() -> None:
+    lengths = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in [*FILES, *OTHERS]}
+    assert {place.parts[0] for place in lengths} == {"src", *FOLDERS}
+    assert not {str(place): lines for place, lines in lengths.items() if lines > 400}
 
 
 def test_every_module_says_what_it_is_for() -> None:

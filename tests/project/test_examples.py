@@ -9,6 +9,7 @@ import pytest
 from places import EXAMPLES
 
 import rotorfault as rf
+from rotorfault.engine import have_simd
 
 SHORT = {"duration": 0.3}
 
@@ -26,7 +27,7 @@ def test_block_flies_alike_in_every_engine() -> None:
     block = example("block_controller", "PdBlock")
     flights = {"python": rf.fly("paper-set-point", block(), settings=SHORT, engine="python")}
     flights["numpy"] = rf.fly("paper-set-point", block(), settings=SHORT, engine="numpy")
-    if importlib.util.find_spec("heyoka") is not None:
+    if have_simd():
         flights["simd"] = rf.fly("paper-set-point", block(), settings=SHORT, engine="simd")
     for name, flight in flights.items():
         gap = np.abs(flight.data["position"] - flights["python"].data["position"]).max()

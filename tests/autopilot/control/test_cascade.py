@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cascade_step import VEHICLE, Array, arr, attitudes, cascade, controller_step, number, sound_thrust
+from gates import needs_simd
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
@@ -143,10 +144,10 @@ def attitude_pair(yaw: float, start: tuple[float, float, float], controller: str
     )
 
 
+@needs_simd
 @each_controller
 def test_attitude_pairs_converge(name: str) -> None:
     """From every attitude to every yaw, the long way round never taken, the full rigid body comes to rest."""
-    pytest.importorskip("heyoka")
     starts = [(r, p, y) for r, p in ((0.8, 0.0), (-0.6, 0.7), (0.0, -0.9)) for y in (0.0, 1.6, 3.1, -3.1)]
     for yaw in (0.0, 3.1, -3.1):
         batch = assemble_all([attitude_pair(yaw, start, name) for start in starts])
