@@ -13,7 +13,7 @@ SOURCE = Path(__file__).parents[1] / "src" / "rotorfault"
 FILES = sorted(SOURCE.rglob("*.py"))
 BELIEF = ("control", "diagnosis", "allocation")
 # Where an import may wait until it is needed, so that the command line starts fast.
-LAZY = ("cli.py",)
+LAZY = ("cli.py", "executors.py", "api.py")
 NUMBER_TYPES = {"heyoka", "casadi"}
 
 

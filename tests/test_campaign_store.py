@@ -27,8 +27,8 @@ from campaign_studies import TINY
 import rotorfault
 from rotorfault.base.errors import InputError
 from rotorfault.base.versions import source_digest
-from rotorfault.campaigns import identity as identity_module
-from rotorfault.campaigns import parquet
+from rotorfault.campaigns.store import identity as identity_module
+from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.store.lock import Lock
 from rotorfault.campaigns.store.parquet import content_digest
 from rotorfault.campaigns.store.store import Key, Store
@@ -84,6 +84,11 @@ def undisturbed() -> pa.Table:
     return pa.concat_tables(pieces).combine_chunks()
 
 
+def missing(store: Store, blocks: list[Key]) -> list[Key]:
+    done = store.done()
+    return [key for key in blocks if key not in done]
+
+
 def everything(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
@@ -98,11 +103,11 @@ def folder(tmp_path: Path) -> Path:
 
 def test_results_come_back_sorted_with_their_block(tmp_path: Path) -> None:
     with start(tmp_path / "new" / "campaign") as store:
-        assert store.missing(BLOCKS) == BLOCKS
+        assert missing(store, BLOCKS) == BLOCKS
         store.put(0, 1, results(0, 1).take([3, 0, *range(4, 20), 2, 1]))
         store.put(0, 0, results(0, 0))
         assert store.done() == {(0, 0), (0, 1)}
-        assert store.missing([(1, 0), (0, 1), (0, 7)]) == [(1, 0), (0, 7)]
+        assert missing(store, [(1, 0), (0, 1), (0, 7)]) == [(1, 0), (0, 7)]
         found = store.get(0, 1)
         assert found.column_names[:3] == ["round", "block", "flight"]
         assert content_digest(found.drop_columns(["round", "block"])) == content_digest(results(0, 1))
@@ -123,7 +128,7 @@ def test_the_order_of_writing_leaves_no_trace(seed: int, tmp_path: Path, folder:
     other, at = tmp_path / "other", rng.randrange(1, len(BLOCKS))
     filled(other, shuffled[:at])
     with Store.open(other, write=True, study=STUDY, digest="program") as store:
-        for key in store.missing(shuffled):
+        for key in missing(store, shuffled):
             rows = rng.sample(range(20), 20)
             store.put(*key, pa.concat_tables([results(*key).take(rows[:7]), results(*key).take(rows[7:])]))
         assert store.finish().read_bytes() == straight
@@ -232,11 +237,11 @@ WRITER = """
 import os, random, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from test_campaign_store import BLOCKS, STUDY, Store, results, start
+from test_campaign_store import BLOCKS, STUDY, Store, missing, results, start
 folder = Path({folder!r})
 known = (folder / "study.json").exists()
 store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
-blocks = store.missing([(r, b) for r in range(3) for b in range(100)])
+blocks = missing(store, [(r, b) for r in range(3) for b in range(100)])
 random.Random({seed}).shuffle(blocks)
 {trap}
 for key in blocks:
@@ -280,7 +285,7 @@ def test_a_killed_run_is_completed_to_the_same_table(
         told = len(Store.open(folder).done())
     with Store.open(folder, write=True, study=STUDY, digest="program") as store:
         assert {path.suffix for path in (folder / "parts").iterdir()} == {".parquet"}
-        for key in store.missing(blocks):
+        for key in missing(store, blocks):
             store.put(*key, results(*key))
         assert store.finish(blocks).read_bytes() == straight
 
@@ -405,7 +410,7 @@ def test_damage_is_named_and_repaired(damage: Callable[[Path], object], words: s
         (moved,) = store.repaired
         assert moved.name == "round-000-block-00002.parquet"
         assert re.match(words, moved.reason)
-        assert store.missing(BLOCKS) == [(0, 2)]
+        assert missing(store, BLOCKS) == [(0, 2)]
         store.put(0, 2, results(0, 2))
         assert content_digest(store.table()) == content_digest(undisturbed())
     assert (folder / "damaged" / "round-000-block-00002.parquet").exists()
@@ -418,7 +423,7 @@ def test_a_part_under_a_wrong_name_is_named_and_moved(name: str, folder: Path) -
         Store.open(folder).table()
     with Store.open(folder, repair=True) as store:
         assert [damage.name for damage in store.repaired] == [name]
-        assert store.missing(BLOCKS) == []
+        assert missing(store, BLOCKS) == []
 
 
 def test_a_part_copied_to_a_free_name_is_found(folder: Path) -> None:
@@ -447,7 +452,7 @@ def test_many_damaged_parts_are_counted_and_all_moved(folder: Path) -> None:
     for _ in range(2):  # the second time, names in damaged/ are taken
         with Store.open(folder, repair=True) as store:
             assert len(store.repaired) == 3
-            for key in store.missing(BLOCKS):
+            for key in missing(store, BLOCKS):
                 store.put(*key, results(*key))
         for block in (1, 2, 4):
             flip(part(folder, 0, block))
@@ -515,7 +520,7 @@ def test_other_versions_are_named(folder: Path, monkeypatch: pytest.MonkeyPatch)
     )
     with pytest.raises(InputError, match=words):
         Store.create(folder, STUDY, "program")
-    assert Store.open(folder).missing(BLOCKS) == []  # to be read, any version will do
+    assert missing(Store.open(folder), BLOCKS) == []  # to be read, any version will do
 
 
 def test_the_digest_of_the_source_leaves_out_what_computes_nothing() -> None:

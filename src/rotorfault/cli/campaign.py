@@ -31,9 +31,9 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
         out: Annotated[
             Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
         ] = None,
-        resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in the folder.")] = False,
+        resume: Annotated[bool, typer.Option("--resume", help="Resume the campaign in the folder.")] = False,
         repair: Annotated[
-            bool, typer.Option("--repair", help="Go on; move damaged parts aside and fly them anew.")
+            bool, typer.Option("--repair", help="Resume; move damaged parts aside and fly them anew.")
         ] = False,
         workers: Annotated[int | None, typer.Option(min=1, help="Threads; one per core if not given.")] = None,
         scheduler: Annotated[
@@ -48,7 +48,7 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
             bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
         ] = False,
     ) -> None:
-        """Fly a survival campaign: thousands of flights over a map, most of them where survival is uncertain.
+        """Fly a survival campaign: thousands of flights over a map, most of them where success is uncertain.
 
         Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
         Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
@@ -107,13 +107,13 @@ def add_to(app: typer.Typer, load: Callable[[str], Any], finish: Callable[[Any, 
                 raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
             flight = again.identifier_of(study, variant, cell, number)
         target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
-        load("files").output_folder(target)
+        load("base.files").output_folder(target)
         finish(campaign.replay(flight), target, figures)
 
 
 def _report(campaign: Any, load: Callable[[str], Any]) -> None:
     """Pictures and page of a campaign, finished or not."""
-    with load("progress").Busy("making the report"):
+    with load("base.progress").Busy("making the report"):
         paths = campaign.report()
     pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
     typer.echo(f"report in {paths[0]}; pictures in {paths[1].parent}: {pictures}, each as SVG too")
