@@ -4,7 +4,8 @@
 
 Chances are computed, not sampled: of each number of survivals at each look, from look to look by binomial steps.
 Per probability of survival: coverage in %, mean width of the interval, mean number of flights. ``least`` is the
-lowest coverage of 999 probabilities. All rules look after the numbers of flights of `rotorfault.campaigns.sampling.refine`.
+lowest coverage of 999 probabilities. All rules look after the numbers of flights of
+`rotorfault.campaigns.sampling.refine`, with a growth of 0.1.
 
 fixed            not a rule: as many flights as Clopper-Pearson needs at this probability, known beforehand
 wilson, exact    ends when Wilson's or Clopper-Pearson's interval of a fixed number is narrow: what does not hold
@@ -131,7 +132,7 @@ def main() -> None:
     parser.add_argument("--level", type=float, default=0.95)
     asked = parser.parse_args()
     width, level, most = asked.width, asked.level, asked.most
-    at = looks(Refinement(width=width, level=level, most=most))
+    at = looks(Refinement(growth=0.1, width=width, level=level, most=most))
     each, together = 1.0 - (1.0 - level) / len(at), simultaneous(at, level)
     rules: dict[str, Rule] = {
         "wilson": narrow(at, width, lambda s, n: wilson(s, n, level)),

@@ -10,15 +10,17 @@ from typing import Any
 
 import pytest
 from campaign_studies import TINY
-from gates import needs_simd
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.executors import InProcess, executor_of
+from rotorfault.base.resumable import Executor
 from rotorfault.campaigns import run
-from rotorfault.campaigns.sampling.plan import Flights
 from rotorfault.campaigns.study import Study, study_from
+from rotorfault.engine import have_simd
 
 distributed = pytest.importorskip("distributed")
-pytestmark = needs_simd
+dask_executor = pytest.importorskip("rotorfault.base.dask_executor")
+pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
 
 
 @pytest.fixture(scope="module")
@@ -29,24 +31,26 @@ def cluster() -> Iterator[Any]:
         yield cluster
 
 
-def complete(study: Study, folder: Path, crew: run.Crew) -> bytes:
+def complete(study: Study, folder: Path, executor: Executor) -> bytes:
     with run.open_store(study, folder, resume=False) as store:
-        run.fly(study, store, crew)
+        run.fly(study, store, executor)
     return (folder / "flights.parquet").read_bytes()
 
 
 def test_a_killed_worker_costs_nothing(cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is lost and nothing is there twice: the very bytes of a campaign on this process alone."""
-    monkeypatch.setattr("rotorfault.campaigns.sampling.plan.FLIGHTS_IN_BLOCK", 6)
+    monkeypatch.setattr("rotorfault.campaigns.rounds.FLIGHTS_IN_BLOCK", 6)
     study = study_from(TINY, "test")
     killed: list[int] = []
 
     class Watched:
-        def __init__(self) -> None:
-            self._right = run.crew(None, cluster.scheduler_address)
+        threads = 1
 
-        def fly(self, study: Study, work: list[tuple[int, Flights]]) -> Any:
-            for result in self._right.fly(study, work):
+        def __init__(self) -> None:
+            self._right = executor_of(None, cluster.scheduler_address)
+
+        def map(self, work: Any, tasks: Any) -> Any:
+            for result in self._right.map(work, tasks):
                 if not killed:
                     killed.append(next(iter(cluster.workers.values())).pid)
                     os.kill(killed[0], signal.SIGKILL)
@@ -54,11 +58,16 @@ def test_a_killed_worker_costs_nothing(cluster: Any, tmp_path: Path, monkeypatch
 
     found = complete(study, tmp_path / "cluster", Watched())
     assert killed
-    assert found == complete(study, tmp_path / "alone", run.Here())
+    assert found == complete(study, tmp_path / "alone", InProcess())
 
 
 def test_no_scheduler_is_one_clear_line() -> None:
     with pytest.raises(InputError, match="cannot be reached"):
-        run.crew(None, "tcp://127.0.0.1:1")
+        executor_of(None, "tcp://127.0.0.1:1")
     with pytest.raises(InputError, match="allowed: an address such as"):
-        run.crew(None, "nonsense")
+        executor_of(None, "nonsense")
+
+
+def test_workers_of_another_version_are_refused() -> None:
+    with pytest.raises(InputError, match="another version of rotorfault"):
+        dask_executor._call("another digest", b"never looked at")

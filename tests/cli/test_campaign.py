@@ -61,7 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "tiny.toml").write_text(STUDY)
     done = call(here, "campaign", "tiny.toml")
     assert done.returncode == 0, done.stderr
-    assert "survived over the map" in done.stderr
+    assert "success over the map" in done.stderr
     return here
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, final
 import pyarrow as pa
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.executors import executor_of
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import replay
 from rotorfault.campaigns.store.store import Store
@@ -45,16 +45,17 @@ class Campaign:
         return self._store.table()
 
     def maps(self) -> Maps:
-        """Survival, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
-        found: Maps = importlib.import_module("rotorfault.campaigns.report.maps").maps(self.study, self.table())
-        return found
+        """Success rates, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
+        from rotorfault.campaigns.report.maps import maps
+
+        return maps(self.study, self.table())
 
     def report(self) -> list[Path]:
         """Write pictures and page; the page's path first."""
-        made: list[Path] = importlib.import_module("rotorfault.campaigns.report.report").write(
-            self.study, self.table(), self.folder, self._store.identity.versions
-        )
-        return made
+        # Loads Matplotlib and Plotly, which a campaign does not need.
+        from rotorfault.campaigns.report.report import write
+
+        return write(self.study, self.table(), self.folder, self._store.identity.versions)
 
     def replay(self, identifier: int) -> Flight:
         """Fly one of the flights once more, with everything recorded: column ``id`` of the table names it."""
@@ -84,17 +85,17 @@ def campaign(
     out : str or Path, optional
         Folder; ``campaigns/NAME`` if not given.
     resume : bool
-        Go on with the campaign in the folder.
+        Resume the campaign in the folder.
     repair : bool
-        Go on; move damaged parts aside and fly them anew.
+        Resume; move damaged parts aside and fly them anew.
     vehicle, preset, seed, budget : optional
-        In place of the study's.
+        In place of the study's; see `rotorfault.campaigns.study.changed`.
     workers : int, optional
         Threads; one per core if not given. Nothing in the table depends on it.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers fly.
     say : callable
-        Is told, line by line, what was moved aside and what each round gave.
+        Is given, line by line, what was moved aside and the results of each round.
 
     Returns
     -------
@@ -103,7 +104,7 @@ def campaign(
     Raises
     ------
     InputError
-        If anything that was given cannot be used; nothing has been flown then.
+        If an argument cannot be used; nothing has been flown then.
     KeyboardInterrupt
         On Ctrl-C; what is done is kept in the folder.
     """
@@ -118,11 +119,11 @@ def campaign(
     checked = changed(checked, vehicle, preset, seed, budget).resolved()
     folder = Path("campaigns") / checked.name if out is None else Path(out)
     run.check(checked)
-    crew = run.crew(workers, scheduler)
+    executor = executor_of(workers, scheduler)
     with run.open_store(checked, folder, resume, repair) as store:
         for damage in store.repaired:
             say(f"moved aside: {damage.name} ({damage.reason})")
-        done = run.fly(checked, store, crew, say)
+        progress = run.fly(checked, store, executor, say)
     table = folder / "flights.parquet"
-    say(f"{done.flights:,} flights in {done.rounds} rounds, {done.seconds:.0f} s; table in {table}")
+    say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")
     return Campaign(folder)

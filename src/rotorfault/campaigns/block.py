@@ -8,16 +8,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rotorfault.campaigns.grades import grades
-from rotorfault.campaigns.sampling.axes import columns
-from rotorfault.campaigns.sampling.plan import Flights, drawn, identifier, seeds
+from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.flight_set import FlightSet, identifiers, seeds, values_of
+from rotorfault.campaigns.grades import RECOVERED, grades
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.many import fly_many
-from rotorfault.loop.scores import SURVIVED as IN_ONE_PIECE
-from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import ScoreTable
-
-RECOVERED = 0.25  # m: within it a vehicle counts as back where it should be
 
 METRICS = (
     "end_time", "cost", "tilt_max", "control_total_variation", "saturated_fraction", "outside_layer_fraction",
@@ -27,18 +23,13 @@ METRICS = (
 """Columns of `ScoreTable` that are kept; dots become underscores."""
 
 
-def vary(study: Study, flights: Flights) -> dict[str, NDArray[Any]]:
-    """Values of axes and draws of each flight, by name."""
-    return {**study.cell_values(flights.cell), **drawn(study, flights)}
-
-
-def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.Table:
+def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> pa.Table:
     """Fly a block.
 
     Parameters
     ----------
     study : Study
-    flights : Flights
+    flights : FlightSet
     threads : int, optional
         One per processor if not given.
 
@@ -46,44 +37,45 @@ def fly_block(study: Study, flights: Flights, threads: int | None = None) -> pa.
     -------
     pyarrow.Table
         One row per flight in order: ``flight`` (within the block), ``id`` (within the campaign, see
-        `rotorfault.campaigns.sampling.plan.identifier`), ``variant``, ``cell``, ``number``, axes and draws by name, ``seed``,
-        ``grade``, ``survived``, ``outcome``, ``recovery_time`` [s], ``altitude_lost`` [m], and `METRICS`.
+        `rotorfault.campaigns.flight_set.identifiers`), ``variant``, ``cell``, ``number``, axes and draws by name,
+        ``seed``, ``grade``, ``success`` (of the grade, by the study), ``survived`` (of the outcome), ``outcome``,
+        ``recovery_time`` [s], ``altitude_lost`` [m], and `METRICS`.
 
     Raises
     ------
     InputError
         If a value is not allowed.
     """
-    names = vary(study, flights)
+    values, seed = values_of(study, flights), seeds(study, flights)
+    settings = {**columns(values), "seed": seed}
     parts: list[tuple[NDArray[np.intp], ScoreTable]] = []
     heights = np.empty(flights.size)
     for variant in np.unique(flights.variant):
         which = np.flatnonzero(flights.variant == variant)
-        mine = flights.part(which)
-        scenario = study.scenario_of(int(variant))
-        given: dict[str, Any] = dict(columns(vary(study, mine)))
-        given["seed"] = seeds(study, mine)
-        parts.append((which, fly_many(scenario, given, within=RECOVERED, threads=threads).table))
-        heights[which] = scenario[REFERENCE].make().table(np.zeros(1)).p_W[0, 2]
+        scenario = study.scenarios[variant]
+        varied = {key: column[which] for key, column in settings.items()}
+        parts.append((which, fly_many(scenario, varied, within=RECOVERED, threads=threads).table))
+        heights[which] = scenario.reference.make().table(np.zeros(1)).p_W[0, 2]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
-    found: dict[str, Any] = {
+    grade = grades(table)
+    rows: dict[str, NDArray[Any]] = {
         "flight": np.arange(flights.size, dtype=np.int64),
-        "id": identifier(study, flights),
+        "id": identifiers(study, flights),
         "variant": np.array([study.variant[v].label for v in flights.variant]),
         "cell": flights.cell,
         "number": flights.number,
-        **names,
-        "seed": seeds(study, flights),
-        "grade": (graded := grades(table)),
-        "survived": np.isin(graded, study.survived),
+        **values,
+        "seed": seed,
+        "grade": grade,
+        "success": np.isin(grade, study.success),
+        "survived": table["survived"],
         "outcome": table["outcome"],
         "recovery_time": recovery_times(table),
         "altitude_lost": altitudes_lost(table, heights),
+        **{name.replace(".", "_"): table[name] for name in METRICS},
     }
-    for name in METRICS:
-        found[name.replace(".", "_")] = table[name]
-    return pa.table({name: _column(values) for name, values in found.items()})
+    return pa.table({name: _column(values) for name, values in rows.items()})
 
 
 def recovery_times(table: ScoreTable) -> NDArray[np.float64]:
@@ -91,9 +83,8 @@ def recovery_times(table: ScoreTable) -> NDArray[np.float64]:
     onsets = np.stack([table[f"onset.{rotor}"] for rotor in "1234"])
     first = np.where(np.isnan(onsets), np.inf, onsets).min(axis=0)
     settled = table["settle_time.overall"]
-    in_one_piece = np.isin(table["outcome"], IN_ONE_PIECE)
     with np.errstate(invalid="ignore"):
-        return np.where(in_one_piece & np.isfinite(first), np.maximum(settled - first, 0.0), np.nan)
+        return np.where(table["survived"] & np.isfinite(first), np.maximum(settled - first, 0.0), np.nan)
 
 
 def altitudes_lost(table: ScoreTable, height: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,16 +1,20 @@
-"""Graded outcomes: what a flight of a campaign was worth, in one word.
+"""Grades: how well a flight of a campaign went, in one word.
+
+The *outcome* of a flight says what happened (`rotorfault.results.metrics`), and whether it *survived* follows from
+that alone. Its *grade* says how good it was:
 
 ====================  ===============================================================================================
-tracked               flew to its end; over the last half within 0.5 m (root mean square) and 0.5 rad of yaw
+held                  flew to its end; over the last half within 0.5 m (root mean square) and 0.5 rad of yaw
 yaw given up          the same in position (up to 2 m), but yaw was off by more
 degraded              flew to its end with a bounded offset, 0.5 m to 2 m
 controlled descent    came down upright (within 30 degrees) at no more than 3 m/s, or landed
-ground                hit the ground faster than that, or tilted
-tumbled               tilted beyond 90 degrees in the air
-diverged              a state is not finite or 10 km away, or the vehicle flew on more than 2 m off
+drifted               flew to its end, but more than 2 m off
+crashed               hit the ground faster than 3 m/s, or tilted by more than 30 degrees
+lost                  tumbled or diverged in the air
 ====================  ===============================================================================================
 
-The first three count as *survived*, unless a study says otherwise. Numbers are taken over the last half of the
+The first three count as *success*, unless a study says otherwise. Success and survival differ: a flight that drifted
+or landed survived, which few would call a success at holding a place. Numbers are taken over the last half of the
 flight, so that what happens right after a fault shows in its recovery and in the altitude lost, not here.
 """
 
@@ -21,30 +25,30 @@ from numpy.typing import NDArray
 
 from rotorfault.results.score_table import ScoreTable
 
-GRADES = ("tracked", "yaw given up", "degraded", "controlled descent", "ground", "tumbled", "diverged")
-SURVIVED = GRADES[:3]
-TRACKED = 0.5  # m
+GRADES = ("held", "yaw given up", "degraded", "controlled descent", "drifted", "crashed", "lost")
+SUCCESS = GRADES[:3]
+# Our choice, about the arm of the paper's vehicle (0.42 m): its centre stays where its rotors were to turn.
+HELD = 0.5  # m
+# Within 2 m PX4 (NAV_ACC_RAD in rc.mc_defaults) and ArduCopter (WPNAV_RADIUS) take a waypoint as reached.
 BOUNDED = 2.0  # m
+# Our choice: what a camera with a field of view of 60 degrees points at stays in view.
 YAW = 0.5  # rad
+# Our choice: half of HELD, so that who has recovered is not on the verge of being degraded.
+RECOVERED = 0.25  # m: within it a vehicle counts as back where it should be
 DESCENT = 3.0  # m/s, as after a fall from 0.5 m
-UPRIGHT = np.radians(30.0)
+UPRIGHT = np.radians(30.0)  # our choice: it comes down on its undercarriage, not on a rotor
 
 
 def grades(table: ScoreTable) -> NDArray[np.str_]:
     """The grade of each flight."""
-    outcome, off = table["outcome"], table["late_position_rms"]
+    outcome, offset = table["outcome"], table["late_position_rms"]
     roll, pitch = table["attitude_end.roll"], table["attitude_end.pitch"]
     # Written as "within", so that NaN counts as outside.
     gentle = (np.cos(roll) * np.cos(pitch) >= np.cos(UPRIGHT)) & (-table["velocity_end.z"] <= DESCENT)
     turned = ~(table["late_yaw_rms"] <= YAW)
-    lasted = np.where(
-        off <= BOUNDED,
-        np.where(turned, "yaw given up", np.where(off <= TRACKED, "tracked", "degraded")),
-        "diverged",
-    )
-    fell = np.where(gentle, "controlled descent", "ground")
+    in_place = np.where(turned, "yaw given up", np.where(offset <= HELD, "held", "degraded"))
     return np.select(
-        [outcome == "diverged", outcome == "tumbled", outcome == "ground", outcome == "landed"],
-        ["diverged", "tumbled", fell, "controlled descent"],
-        lasted,
+        [np.isin(outcome, ("tumbled", "diverged")), outcome == "ground", outcome == "landed", offset <= BOUNDED],
+        ["lost", np.where(gentle, "controlled descent", "crashed"), "controlled descent", in_place],
+        "drifted",
     )

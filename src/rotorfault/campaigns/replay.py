@@ -5,34 +5,39 @@ from __future__ import annotations
 from typing import Any
 
 from rotorfault.base.errors import InputError
-from rotorfault.campaigns.block import vary
-from rotorfault.campaigns.sampling.axes import columns
-from rotorfault.campaigns.sampling.plan import Flights, identified, seeds
+from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.flight_set import FlightSet, flight_of, seeds, values_of
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly
 
 
-def settings_of(study: Study, flight: Flights) -> dict[str, Any]:
+def settings_of(study: Study, flight: FlightSet) -> dict[str, Any]:
     """All that one flight has in place of its variant's scenario."""
-    found = {key: column[0].item() for key, column in columns(vary(study, flight)).items()}
-    return {**found, "seed": int(seeds(study, flight)[0])}
+    settings = {key: column[0].item() for key, column in columns(values_of(study, flight)).items()}
+    return {**settings, "seed": int(seeds(study, flight)[0])}
 
 
 def replay(study: Study, identifier: int) -> Flight:
     """Fly a flight of a campaign once more.
+
+    Parameters
+    ----------
+    study : Study
+    identifier : int
+        Column ``id`` of the campaign's table.
 
     Raises
     ------
     InputError
         If there is no such flight.
     """
-    one = identified(study, identifier)
-    return fly(study.scenario_of(int(one.variant[0])), settings=settings_of(study, one))
+    flight = flight_of(study, identifier)
+    return fly(study.scenarios[int(flight.variant[0])], settings=settings_of(study, flight))
 
 
 def identifier_of(study: Study, label: str, cell: int, number: int) -> int:
-    """Identifier of a flight by the variant's name, the cell and the number within it.
+    """Identifier of a flight by the variant's label, the cell and the number within it.
 
     Raises
     ------

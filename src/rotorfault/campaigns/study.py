@@ -7,7 +7,7 @@ drawn anew for each flight, and variants that are compared: every variant flies 
 from __future__ import annotations
 
 import copy
-import hashlib
+import functools
 import json
 import re
 from importlib import resources
@@ -20,9 +20,9 @@ from pydantic import Field, field_validator, model_validator
 
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
-from rotorfault.campaigns.grades import GRADES, SURVIVED
-from rotorfault.campaigns.sampling.axes import AXES, axis
-from rotorfault.campaigns.sampling.refine import Refinement, looks
+from rotorfault.campaigns.axes import axis
+from rotorfault.campaigns.grades import GRADES, SUCCESS
+from rotorfault.campaigns.sampling.refine import Refinement
 from rotorfault.campaigns.studies import FOLDER, study_names
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import load_scenario
@@ -34,7 +34,7 @@ MOST_CELLS = 100_000
 
 
 class GridAxis(Strict):
-    """One axis of the map: values, or so many evenly spaced between two."""
+    """One axis of the map: values, or a number of them evenly spaced between two."""
 
     name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
     values: tuple[float | str, ...] | None = Field(default=None, description="the values")
@@ -44,7 +44,7 @@ class GridAxis(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> GridAxis:
-        _known(self.name)
+        _require_axis(self.name)
         by_range = (self.start, self.stop, self.count)
         if self.values is not None:
             if any(part is not None for part in by_range):
@@ -84,7 +84,7 @@ class Draw(Strict):
 
     @model_validator(mode="after")
     def _consistent(self) -> Draw:
-        _known(self.name)
+        _require_axis(self.name)
         if sum(part is not None for part in (self.uniform, self.normal, self.choice)) != 1:
             raise refusal("", "give one of uniform, normal and choice")
         if self.uniform is not None and not self.uniform[0] < self.uniform[1]:
@@ -107,22 +107,6 @@ class Variant(Strict):
     settings: dict[str, Any] = Field(default={}, description="dotted keys and values")
 
 
-class Refine(Strict):
-    """How many flights a cell gets; see `rotorfault.campaigns.sampling.refine.Refinement`."""
-
-    initial: int = Field(default=24, ge=1, description="flights of a variant in each cell in the first round")
-    block: int = Field(default=24, ge=1, description="further flights in a round, at least")
-    growth: float = Field(default=0.5, ge=0.0, description="further flights as a share of those there are, at least")
-    width: float = Field(default=0.2, gt=0.0, lt=1.0, description="width of the interval at which a cell is done")
-    level: float = Field(default=0.95, gt=0.0, lt=1.0, description="chance with which an interval covers")
-    most: int = Field(default=240, ge=1, description="flights of a variant in a cell, at most")
-    budget: int | None = Field(default=None, ge=1, description="flights of all variants in all cells, at most")
-
-    def refinement(self) -> Refinement:
-        """The same for the rule."""
-        return Refinement(self.initial, self.block, self.growth, self.width, self.level, self.most, self.budget)
-
-
 class Study(Strict):
     """Everything that defines a campaign."""
 
@@ -143,10 +127,10 @@ class Study(Strict):
     variant: tuple[Variant, ...] = Field(
         min_length=1, max_length=20, description="[[variant]] tables: what is compared"
     )
-    refine: Refine = Field(default=Refine(), description="how many flights a cell gets")
-    survived: tuple[str, ...] = Field(default=SURVIVED, min_length=1, description="grades that count as survived")
+    refine: Refinement = Field(default=Refinement(), description="how many flights a cell gets")
+    success: tuple[str, ...] = Field(default=SUCCESS, min_length=1, description="grades that count as success")
 
-    @field_validator("survived")
+    @field_validator("success")
     @classmethod
     def _grades(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         for grade in value:
@@ -164,10 +148,6 @@ class Study(Strict):
             raise refusal("variant", f"two variants are called '{max(labels, key=labels.count)}'")
         if self.cells > MOST_CELLS:
             raise refusal("axis", f"makes {self.cells:.3g} cells; allowed: up to {MOST_CELLS:,}; take coarser axes")
-        try:
-            looks(self.refine.refinement())
-        except InputError as error:
-            raise refusal("refine", str(error)) from None
         if self.most_flights > MOST_FLIGHTS:
             raise refusal(
                 "refine", f"up to {self.most_flights:.3g} flights; allowed: up to {MOST_FLIGHTS:.0e}; lower 'most', "
@@ -196,11 +176,6 @@ class Study(Strict):
         """Flights of the whole campaign, at most."""
         return min(float(self.refine.budget or np.inf), float(self.refine.most) * self.cells * len(self.variant))
 
-    @property
-    def digest(self) -> str:
-        """Names all that the study says."""
-        return hashlib.sha256(json.dumps(self.as_tables(), sort_keys=True).encode()).hexdigest()
-
     def as_tables(self) -> dict[str, Any]:
         """The study as plain data from which `study_from` makes it again."""
         data: dict[str, Any] = json.loads(self.model_dump_json(exclude_none=True))
@@ -226,7 +201,7 @@ class Study(Strict):
             try:
                 tables["scenario"] = load_scenario(self.scenario).as_tables()
             except InputError as error:
-                raise InputError(f"variant '{self.variant[0].label}': {error}") from None
+                raise InputError(f"study '{self.name}': {error}") from None
         for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
             if str(settings.get("vehicle", "")).endswith(".toml"):
                 settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
@@ -237,26 +212,42 @@ class Study(Strict):
         """Name of what is flown."""
         return self.scenario if isinstance(self.scenario, str) else str(self.scenario.get("name", "scenario"))
 
-    def scenario_of(self, variant: int) -> Scenario:
-        """What a variant flies, before anything varies.
+    @functools.cached_property
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """What each variant flies, before anything varies.
 
         Raises
         ------
         InputError
             If the scenario cannot be used, or a setting is not allowed.
         """
-        settings = {**self.settings, **self.variant[variant].settings}
+        return tuple(self._scenario_of(variant) for variant in self.variant)
+
+    def _scenario_of(self, variant: Variant) -> Scenario:
         try:
-            if isinstance(self.scenario, str):
-                return load_scenario(self.scenario, settings)
-            tables = copy.deepcopy(self.scenario)
-            override_all(tables, settings)
-            return scenario_from(tables, str(tables.get("name", "scenario")))
+            return self._scenario({**self.settings, **variant.settings})
         except InputError as error:
-            raise InputError(f"variant '{self.variant[variant].label}': {error}") from None
+            where = f"variant '{variant.label}'"
+            try:
+                self._scenario(self.settings)
+            except InputError as without:
+                # The same without the variant's settings: the variant is not to blame.
+                where = f"study '{self.name}'" if str(without) == str(error) else where
+            raise InputError(f"{where}: {error}") from None
+
+    def _scenario(self, settings: dict[str, Any]) -> Scenario:
+        if isinstance(self.scenario, str):
+            return load_scenario(self.scenario, settings)
+        tables = copy.deepcopy(self.scenario)
+        override_all(tables, settings)
+        return scenario_from(tables, str(tables.get("name", "scenario")))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Goes to other processes as plain data: scenarios hold registered parts, which cannot be pickled.
+        return study_from, (self.as_tables(), self.name)
 
 
-def _known(name: str) -> None:
+def _require_axis(name: str) -> None:
     try:
         axis(name)
     except InputError as error:
@@ -321,8 +312,3 @@ def changed(
 def study_from(tables: dict[str, Any], where: str) -> Study:
     """Check a study given as tables; `where` names their origin in messages."""
     return validate(Study, tables, where)
-
-
-def unit(name: str) -> str:
-    """Unit of an axis, empty where it has none."""
-    return AXES[name].unit if name in AXES else ""

@@ -22,9 +22,9 @@ def campaign(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the campaign in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume the campaign in the folder.")] = False,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Go on; move damaged parts aside and fly them anew.")
+        bool, typer.Option("--repair", help="Resume; move damaged parts aside and fly them anew.")
     ] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Threads; one per core if not given.")] = None,
     scheduler: Annotated[
@@ -40,7 +40,7 @@ def campaign(
     ] = False,
     allow_code: AllowCode = False,
 ) -> None:
-    """Fly a survival campaign: thousands of flights over a map, most of them where survival is uncertain.
+    """Fly a survival campaign: thousands of flights over a map, most of them where success is uncertain.
 
     Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
     Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.

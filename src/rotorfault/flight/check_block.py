@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -146,7 +147,7 @@ def _checks(part: Part[Any]) -> Iterator[Check]:
         return
     for engine in ("numpy", "simd"):
         if engine == "numpy" or have_simd():
-            yield _try(f"engine {engine} gives the numbers of floats", lambda name=engine: _agrees(part, name))
+            yield _try(f"engine {engine} gives the numbers of floats", partial(_agrees, part, engine))
     if part.slot.side != "task":
         yield _try("no number of its settings is baked into its code", lambda: _not_baked(part))
         yield _try("every number of its settings is a parameter", lambda: _parameters(part))

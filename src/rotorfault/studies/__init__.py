@@ -1,1 +1,1 @@
-"""Studies: many flights for one question."""
+"""Studies: many single flights for one question, flown once each and kept whole."""

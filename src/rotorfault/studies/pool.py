@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Iterable
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 
-from rotorfault.base.errors import InputError
-from rotorfault.base.progress import Bar
-from rotorfault.studies.runs import Measure, Run, Store
-
-_store: Store | None = None
+from rotorfault.base.executors import Processes
+from rotorfault.base.resumable import Task, run_missing
+from rotorfault.scenario.scenario import Scenario
+from rotorfault.studies.runs import Result, Run, RunStore
 
 
-def fly_missing(store: Store, runs: Iterable[Run], title: str, workers: int | None = None) -> int:
+def fly_missing(store: RunStore, runs: Iterable[Run], title: str, workers: int | None = None) -> int:
     """Fly every run that the store has no result of; the number flown.
 
     Parameters
     ----------
-    store : Store
+    store : RunStore
     runs : iterable of Run
     title : str
-        For the progress bar.
+        Of the progress bar.
     workers : int, optional
         Processes; one per core if not given. With 1 everything is flown in this process.
 
@@ -33,44 +27,23 @@ def fly_missing(store: Store, runs: Iterable[Run], title: str, workers: int | No
     KeyboardInterrupt
         On Ctrl-C; runs that were done are kept, the next call goes on with the rest.
     """
-    missing = list({run.id: run for run in store.missing(runs)}.values())
-    workers = min(workers or os.cpu_count() or 1, len(missing))
-    with Bar(title, len(missing), "flights") as bar:
-        if workers <= 1:
-            for done, run in enumerate(missing, start=1):
-                store.get(run)
-                bar.update(done)
-            return len(missing)
-        # Spawned, not forked: the compiled loops and threads of this process must not be copied half-way.
-        with ProcessPoolExecutor(
-            workers, mp_context=get_context("spawn"), initializer=_start, initargs=store.recipe
-        ) as pool:
-            futures: list[Future[None]] = [pool.submit(_fly, run) for run in _grouped(missing)]
-            try:
-                for done, future in enumerate(as_completed(futures), start=1):
-                    future.result()
-                    bar.update(done)
-            except BrokenProcessPool:
-                raise InputError("a worker process was killed; start again, what is done is kept") from None
-            except BaseException:
-                for future in futures:
-                    future.cancel()
-                raise
-    return len(missing)
+    loaded = {run.id: (run, run.load()) for run in runs}
+    # The time that a flight takes is about proportional to its integration steps.
+    tasks = [
+        Task(run.id, run, duration=float(scenario.steps * scenario.substeps)) for run, scenario in loaded.values()
+    ]
+    return run_missing(tasks, store.get, _Runs(store, loaded), Processes(workers), title, "flights")
 
 
-def _grouped(runs: list[Run]) -> list[Run]:
-    """Longest first, so that no core waits for a last long flight."""
-    return sorted(runs, key=lambda run: (run.scenario != "paper-square", run.id))
+class _Runs:
+    """Some runs of a store, by their ids."""
 
+    def __init__(self, store: RunStore, loaded: dict[str, tuple[Run, Scenario]]) -> None:
+        self._store, self._loaded = store, loaded
 
-def _start(folder: str, measure: Measure | None, label: str) -> None:
-    global _store
-    # Ctrl-C reaches the whole process group; the parent decides what it means.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _store = Store.from_recipe(folder, measure, label)
+    def done(self) -> set[str]:
+        """Ids of the runs whose results are there."""
+        return {key for key, (run, scenario) in self._loaded.items() if self._store.find(run, scenario) is not None}
 
-
-def _fly(run: Run) -> None:
-    assert _store is not None
-    _store.get(run)
+    def keep(self, key: str, result: Result) -> None:
+        """Nothing: `RunStore.get` has kept it where it was flown, for a flight is too large to be sent."""

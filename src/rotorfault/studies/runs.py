@@ -1,6 +1,6 @@
 """Flights that a study needs, flown once each and kept.
 
-A `Run` is a scenario with overrides under a name. `Store` flies what is missing and keeps, per run, the summary as
+A `Run` is a scenario with overrides under a name. `RunStore` flies what is missing and keeps, per run, the summary as
 JSON and, where asked for, the flight as NetCDF. What is kept is found again by a digest of the whole configuration
 and of the program's source, so that a second start flies nothing twice and no stale number survives a change.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +36,10 @@ class Run(NamedTuple):
     overrides: tuple[tuple[str, Any], ...] = ()  # dotted keys and values
     keep: bool = False  # whether the whole flight is kept, or its summary only
 
+    def load(self) -> Scenario:
+        """What is flown."""
+        return load_scenario(self.scenario, dict(self.overrides))
+
     @property
     def command(self) -> str:
         """The command that flies it alone."""
@@ -52,7 +56,7 @@ class Result(NamedTuple):
 
     run: Run
     summary: dict[str, Any]
-    extra: dict[str, Any]  # what the study measured besides, see `Store`
+    extra: dict[str, Any]  # what the study measured besides, see `RunStore`
     seconds: float  # how long it took to fly
     path: Path | None  # flight.nc, where it is kept
 
@@ -63,7 +67,7 @@ class Result(NamedTuple):
         return load(self.path).data
 
 
-class Store:
+class RunStore:
     """Flies runs and keeps their results in a folder.
 
     Parameters
@@ -81,49 +85,22 @@ class Store:
         (folder / "flights").mkdir(parents=True, exist_ok=True)
         (folder / "runs").mkdir(exist_ok=True)
 
-    @property
-    def recipe(self) -> tuple[str, Measure | None, str]:
-        """Arguments of `from_recipe`, to open the same store in another process."""
-        return str(self.folder), self._measure, self._label
-
-    @classmethod
-    def from_recipe(cls, folder: str, measure: Measure | None, label: str) -> Store:
-        """Open a store from its recipe."""
-        return cls(Path(folder), measure, label)
-
     def get(self, run: Run) -> Result:
         """The result of a run, flown now if it is not there yet."""
-        scenario = load_scenario(run.scenario, dict(run.overrides))
-        digest = self._digest(run, scenario)
-        kept = self._kept(run, digest)
-        return kept if kept is not None else self._fly(run, scenario, digest)
+        scenario = run.load()
+        result = self.find(run, scenario)
+        return result if result is not None else self._fly(run, scenario)
 
-    def missing(self, runs: Iterable[Run]) -> list[Run]:
-        """Runs that have no result yet."""
-        return [
-            run
-            for run in runs
-            if self._kept(run, self._digest(run, load_scenario(run.scenario, dict(run.overrides)))) is None
-        ]
+    def find(self, run: Run, scenario: Scenario | None = None) -> Result | None:
+        """The result of a run if it is there, and nothing that matters has changed since.
 
-    def _fly(self, run: Run, scenario: Scenario, digest: str) -> Result:
-        start = time.perf_counter()
-        flight = fly(scenario)
-        if flight.outcome.kind == "interrupted":
-            raise KeyboardInterrupt
-        extra = {} if self._measure is None else finite_or_none(self._measure(flight.data))
-        seconds = time.perf_counter() - start
-        path = self.folder / "flights" / f"{run.id}.nc" if run.keep else None
-        if path is not None:
-            flight.save(path)
-        content = {"digest": digest, "summary": flight.summary(), "extra": extra, "seconds": seconds}
-        text = json.dumps(content, indent=1, allow_nan=False)
-        # After the flight's own file: a record without its flight must not be found.
-        write_atomically(self._record(run), lambda temporary: temporary.write_text(text, encoding="utf-8"))
-        self.flown += 1
-        return Result(run, dict(flight.summary()), extra, seconds, path)
-
-    def _kept(self, run: Run, digest: str) -> Result | None:
+        Parameters
+        ----------
+        run : Run
+        scenario : Scenario, optional
+            Of the run, where the caller has loaded it.
+        """
+        digest = self._digest(run, run.load() if scenario is None else scenario)
         try:
             content = json.loads(self._record(run).read_text(encoding="utf-8"))
             if content["digest"] != digest:
@@ -134,6 +111,24 @@ class Store:
             return Result(run, content["summary"], content["extra"], float(content["seconds"]), path)
         except (OSError, ValueError, KeyError, TypeError):
             return None  # missing or damaged: flown anew
+
+    def _fly(self, run: Run, scenario: Scenario) -> Result:
+        start = time.perf_counter()
+        flight = fly(scenario)
+        if flight.outcome.kind == "interrupted":
+            raise KeyboardInterrupt
+        extra = {} if self._measure is None else finite_or_none(self._measure(flight.data))
+        seconds = time.perf_counter() - start
+        path = self.folder / "flights" / f"{run.id}.nc" if run.keep else None
+        if path is not None:
+            flight.save(path)
+        digest = self._digest(run, scenario)
+        content = {"digest": digest, "summary": flight.summary(), "extra": extra, "seconds": seconds}
+        text = json.dumps(content, indent=1, allow_nan=False)
+        # After the flight's own file: there must be no record without its flight.
+        write_atomically(self._record(run), lambda temporary: temporary.write_text(text, encoding="utf-8"))
+        self.flown += 1
+        return Result(run, dict(flight.summary()), extra, seconds, path)
 
     def _record(self, run: Run) -> Path:
         return self.folder / "runs" / f"{run.id}.json"

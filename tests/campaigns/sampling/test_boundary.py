@@ -125,7 +125,7 @@ def test_crossings_lie_in_their_intervals_and_alternate(s: list[int], level: flo
 
 def test_intervals_hold_the_true_boundary_after_refinement() -> None:
     """40 maps of ten rows, refined: the interval of the 50 % crossing holds the true one in at least 95 %."""
-    rng, x, settings = np.random.default_rng(8), np.arange(0.0, 8.0, 0.5), Refinement(width=0.2, most=300)
+    rng, x, settings = np.random.default_rng(8), np.arange(0.0, 8.0, 0.5), Refinement(growth=0.1, width=0.2, most=300)
     edges = np.tile(np.linspace(2.1, 5.9, 10), 40)
     p = 1.0 / (1.0 + np.exp(2.0 * (x - edges[:, None])))
     s, n = np.zeros((2, *p.shape), int)

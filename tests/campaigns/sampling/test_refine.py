@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.sampling.refine import Refinement, finished, further_flights, intervals, looks
 from rotorfault.campaigns.sampling.sampling_plan import Plan, sampling_plan
@@ -18,11 +19,17 @@ from rotorfault.campaigns.sampling.statistics import clopper_pearson, wilson
 
 Counts = NDArray[np.int64]
 
-SURVIVALS = np.array([0.01, 0.1, 0.5, 0.99])
+
+def fine(**changes: Any) -> Refinement:
+    """Narrower intervals and smaller steps than studies have by default, so that plans are long."""
+    return Refinement(**{"growth": 0.1, "width": 0.1, "most": 600, **changes})
+
+
+SUCCESS_RATES = np.array([0.01, 0.1, 0.5, 0.99])
 PLANS = {
-    "as_set": (looks(Refinement()), 0.1),
-    "small_blocks": (looks(Refinement(initial=16, block=8, most=300)), 0.15),
-    "large_blocks": (looks(Refinement(initial=50, block=100, growth=0.5, most=2000)), 0.05),
+    "as_set": (looks(fine()), 0.1),
+    "small_blocks": (looks(fine(initial=16, block=8, most=300)), 0.15),
+    "large_blocks": (looks(fine(initial=50, block=100, growth=0.5, most=2000)), 0.05),
     "few_flights": ((5, 10, 20), 0.3),
     "fixed": ((60,), 0.1),
 }
@@ -49,8 +56,8 @@ def step_function(columns: int = 20) -> NDArray[np.float64]:
 @pytest.mark.parametrize("budget", [None, 1_000_000, 400_000])
 def test_intervals_cover_although_results_decide_when_flights_end(budget: int | None) -> None:
     """2,000 rows of one grid, each with all four survivals: neighbours decide as well, and the budget may end all."""
-    settings = Refinement(budget=budget)
-    p = np.tile(SURVIVALS, (1, 2000, 1))
+    settings = fine(budget=budget)
+    p = np.tile(SUCCESS_RATES, (1, 2000, 1))
     s, n, _ = campaign(p, settings, seed=11)
     lower, upper = intervals(s, n, settings)
     coverage = ((lower <= p) & (p <= upper)).mean(axis=(0, 1))
@@ -118,7 +125,7 @@ def test_not_many_more_flights_than_if_survival_were_known(p: float, most: float
         lower, upper = clopper_pearson(np.arange(known + 1), known)
         if (binom.pmf(np.arange(known + 1), known, p) * (upper - lower)).sum() <= width:
             break
-    assert chances(sampling_plan(looks(Refinement(most=1000)), width), p).flights < most * known
+    assert chances(sampling_plan(looks(fine(most=1000)), width), p).flights < most * known
 
 
 # --------------------------------------------------------------------------------------------------- plan, properties
@@ -168,7 +175,7 @@ def test_plans_are_shared_and_cannot_be_written() -> None:
 
 
 def test_the_same_counts_give_the_same_rounds() -> None:
-    settings = Refinement(budget=20_000)
+    settings = fine(budget=20_000)
     once, again = (campaign(step_function(), settings, seed=3) for _ in range(2))
     np.testing.assert_array_equal(once[1], again[1])
     assert len(once[2]) == len(again[2])
@@ -176,17 +183,17 @@ def test_the_same_counts_give_the_same_rounds() -> None:
 
 def test_flights_go_where_survival_is_uncertain() -> None:
     p = np.array([[1.0, 0.999, 0.9, 0.5, 0.1, 0.001, 0.0]])
-    _, n, rounds = campaign(p, Refinement(), seed=1)
+    _, n, rounds = campaign(p, fine(), seed=1)
     assert (np.diff(n[0, :4]) >= 0).all()
     assert n[0, 3] > 4 * n[0, 0]
     assert (rounds[0] == 24).all()
-    assert len(rounds) < len(looks(Refinement())) + 1
+    assert len(rounds) < len(looks(fine())) + 1
 
 
 def test_a_scarce_budget_is_spent_at_the_edge_of_a_step() -> None:
     p = step_function()
     first = 24 * p.size
-    settings = Refinement(budget=first + 480)
+    settings = fine(budget=first + 480)
     _, n, rounds = campaign(p, settings, seed=2)
     edge = np.zeros(p.shape, bool)
     edge[..., 1:] |= p[..., 1:] != p[..., :-1]
@@ -202,17 +209,17 @@ def test_a_scarce_budget_is_spent_at_the_edge_of_a_step() -> None:
 def test_neighbours_are_of_one_controller() -> None:
     """One survives everywhere, the other nowhere: neither has a boundary."""
     s = np.array([[[24, 24], [24, 24]], [[0, 0], [0, 0]]])
-    further = further_flights(s, np.full(s.shape, 24), Refinement(budget=24 * 8 + 24 * 3))
+    further = further_flights(s, np.full(s.shape, 24), fine(budget=24 * 8 + 24 * 3))
     assert further.ravel().tolist() == [24, 24, 24, 0, 0, 0, 0, 0]  # none before the other, so in order
     s[1, 1, 1] = 24
-    further = further_flights(s, np.full(s.shape, 24), Refinement(budget=24 * 8 + 24 * 4))
+    further = further_flights(s, np.full(s.shape, 24), fine(budget=24 * 8 + 24 * 4))
     assert further.ravel().tolist() == [0, 0, 0, 0, 0, 24, 24, 24]
 
 
 @given(seed=st.integers(0, 10_000), spare=st.integers(0, 3000), shape=st.sampled_from([(1, 6), (2, 3, 2), (3, 1, 1)]))
 def test_budget_and_limit_are_kept(seed: int, spare: int, shape: tuple[int, ...]) -> None:
     p = np.random.default_rng(seed).random(shape)
-    settings = Refinement(budget=24 * p.size + spare, most=200)
+    settings = fine(budget=24 * p.size + spare, most=200)
     s, n, rounds = campaign(p, settings, seed)
     assert n.sum() <= settings.budget
     assert n.max() <= 200
@@ -223,7 +230,7 @@ def test_budget_and_limit_are_kept(seed: int, spare: int, shape: tuple[int, ...]
 
 @given(start=st.integers(1, 50), block=st.integers(1, 50), growth=st.floats(0.0, 2.0), more=st.integers(0, 3000))
 def test_looks_ascend_to_the_most(start: int, block: int, growth: float, more: int) -> None:
-    at = looks(Refinement(initial=start, block=block, growth=growth, most=start + more))
+    at = looks(fine(initial=start, block=block, growth=growth, most=start + more))
     assert at[0] == start
     assert at[-1] == start + more
     assert (np.diff(at) > 0).all()
@@ -233,21 +240,24 @@ def test_looks_ascend_to_the_most(start: int, block: int, growth: float, more: i
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("tables", "message"),
     [
-        (Refinement(initial=0), "initial: got 0"),
-        (Refinement(block=0), "block: got 0"),
-        (Refinement(most=10), "most: got 10"),
-        (Refinement(growth=-0.1), r"growth: got -0\.1"),
-        (Refinement(width=1.5), r"width: got 1\.5"),
-        (Refinement(level=95.0), r"level: got 95"),
-        (Refinement(reserve=1.0), r"reserve: got 1\.0"),
-        (Refinement(budget=47), "at least 48"),
+        ({"initial": 0}, "initial: .*got 0"),
+        ({"block": 0}, "block: .*got 0"),
+        ({"most": 10}, "most: got 10; allowed: at least initial, 24"),
+        ({"growth": -0.1}, r"growth: .*got -0\.1"),
+        ({"width": 1.5}, r"width: .*got 1\.5"),
+        ({"level": 95.0}, r"level: .*got 95"),
     ],
 )
-def test_settings_that_cannot_be_used_are_named(settings: Refinement, message: str) -> None:
+def test_settings_that_cannot_be_used_are_named(tables: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        further_flights([[0, 0]], [[0, 0]], settings)
+        validate(Refinement, tables, "refine")
+
+
+def test_a_budget_must_suffice_for_the_first_round() -> None:
+    with pytest.raises(InputError, match="at least 48"):
+        further_flights([[0, 0]], [[0, 0]], Refinement(budget=47))
 
 
 @pytest.mark.parametrize(
@@ -256,17 +266,17 @@ def test_settings_that_cannot_be_used_are_named(settings: Refinement, message: s
     ids=["part of a block", "flown on after it was done", "more than the most"],
 )
 def test_counts_that_the_rule_does_not_lead_to_are_refused(s: int, n: int) -> None:
-    settings = Refinement(width=0.3)
-    with pytest.raises(InputError, match=rf"cell \(0, 1\) has {s} survivals of {n} flights"):
+    settings = fine(width=0.3)
+    with pytest.raises(InputError, match=rf"cell \(0, 1\) has {s} successes of {n} flights"):
         intervals([[0, s]], [[0, n]], settings)
 
 
 def test_nothing_is_known_of_cells_without_flights() -> None:
-    lower, upper = intervals([[0, 24]], [[0, 24]], Refinement())
+    lower, upper = intervals([[0, 24]], [[0, 24]], fine())
     assert (lower[0, 0], upper[0, 0]) == (0.0, 1.0)
     assert lower[0, 1] > 0.5
-    lower, upper = intervals(0, 0, Refinement())
+    lower, upper = intervals(0, 0, fine())
     assert (lower, upper) == (0.0, 1.0)
-    assert not finished(0, 0, Refinement())
+    assert not finished(0, 0, fine())
     with pytest.raises(InputError, match="successes"):
-        intervals(5, 3, Refinement())
+        intervals(5, 3, fine())

@@ -1,1 +1,4 @@
-"""Maps, figures and the page of a campaign."""
+"""What a campaign shows: numbers of its maps from its table, figures, and a page that opens offline.
+
+Reads tables and studies; flies nothing and decides nothing.
+"""

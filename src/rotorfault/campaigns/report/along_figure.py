@@ -1,4 +1,4 @@
-"""Along the first axis, over all cells of the others: what flights ended as, how fast and how low they recovered."""
+"""Along the first axis, over all cells of the others: grades, and how fast and how low flights recovered."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ BESIDE = 0.6  # share of a cell over which marks of variants are spread
 LEAST_HIGH = 1.0  # s or m: top of an axis on which all is 0
 
 
-def outcome_figure(maps: Maps) -> Figure:
-    """Grades as shares of flights, one panel for each variant; the black line is survival."""
+def grade_figure(maps: Maps) -> Figure:
+    """Grades as shares of flights, one panel for each variant; the black line is the success rate."""
     across = columns(len(maps.variants))
     down = -(-len(maps.variants) // across)
     figure = new_figure(1.8 + down * (6.0 if across <= 2 else 4.6))
     grid = figure.subplots(down, across, squeeze=False, sharex=True, sharey=True)
     x = maps.views[0]
     edges, widths = borders(x)[:-1], np.diff(borders(x))
-    # What survives below, so that the line between is survival.
-    order = [g for g in GRADES if g in maps.study.survived] + [g for g in GRADES if g not in maps.study.survived]
+    # Successes below, so that the line above them is the success rate.
+    order = [g for g in GRADES if g in maps.study.success] + [g for g in GRADES if g not in maps.study.success]
     for k, axes in enumerate(grid.flat):
         if k >= len(maps.variants):
             axes.set_visible(False)
@@ -47,8 +47,8 @@ def outcome_figure(maps: Maps) -> Figure:
                 linewidth=0.3 if len(widths) < 60 else 0.0,
             )  # fmt: skip
             below = below + share
-        survival = sum(variant.shares[GRADES.index(grade)] for grade in maps.study.survived)
-        axes.stairs(np.asarray(survival), borders(x), color=BLACK, linewidth=1.2, baseline=None)
+        success_rate = sum(variant.shares[GRADES.index(grade)] for grade in maps.study.success)
+        axes.stairs(np.asarray(success_rate), borders(x), color=BLACK, linewidth=1.2, baseline=None)
         axes.set_title(shown(variant.label, 30))
         axes.grid(visible=False)
         if k % across == 0:
@@ -58,10 +58,10 @@ def outcome_figure(maps: Maps) -> Figure:
             axes.set_xlabel(label(x))
     scale_x(grid[0, 0], x, 9 if across <= 2 else 6)
     grid[0, 0].set_ylim(0.0, 1.0)
-    met = [g for g in order if any(np.nansum(v.shares[GRADES.index(g)]) > 0.0 for v in maps.variants)]
-    handles: list[Artist] = [Patch(facecolor=GRADE_COLOURS[grade], label=grade) for grade in met]
-    handles.append(Line2D([], [], color=BLACK, linewidth=1.2, label="survival"))
-    across = legend_columns([*met, "survival"])
+    present = [g for g in order if any(np.nansum(v.shares[GRADES.index(g)]) > 0.0 for v in maps.variants)]
+    handles: list[Artist] = [Patch(facecolor=GRADE_COLOURS[grade], label=grade) for grade in present]
+    handles.append(Line2D([], [], color=BLACK, linewidth=1.2, label="success"))
+    across = legend_columns([*present, "success"])
     figure.legend(handles=handles, loc="outside upper center", ncols=across)
     return figure
 
@@ -84,10 +84,8 @@ def recovery_figure(maps: Maps) -> Figure:
     low, high = (f"{100.0 * p:g}" for p in (PROBABILITIES[0], PROBABILITIES[-1]))
     handles.append(Line2D([], [], color="0.6", linewidth=2.4, label=f"{low} to {high} % of flights"))
     if endless:
-        handles.append(
-            Line2D([], [], marker="x", color=BLACK, linestyle="none", label="most never recover, or are lost")
-        )
-    title = "median over all flights; those that never recover, or are lost, count as beyond all others"
+        handles.append(Line2D([], [], marker="x", color=BLACK, linestyle="none", label="most never recover, or fail"))
+    title = "median over all flights; those that never recover, or fail, count as beyond all others"
     across = legend_columns([str(handle.get_label()) for handle in handles])
     figure.legend(handles=handles, loc="outside upper center", ncols=across, title=title)
     return figure
@@ -97,9 +95,9 @@ def _bars(axes: Axes, maps: Maps, quantiles: list[Array]) -> bool:
     """Medians and bars of each variant beside those of the others; whether some median is beyond the axis."""
     x = maps.views[0]
     at = places(x)
-    known = [values[np.isfinite(values)] for values in quantiles]
+    finite = [values[np.isfinite(values)] for values in quantiles]
     _, high = padded(
-        0.0, max((float(values.max()) for values in known if values.size), default=0.0) or LEAST_HIGH, 0.1
+        0.0, max((float(values.max()) for values in finite if values.size), default=0.0) or LEAST_HIGH, 0.1
     )
     width = BESIDE * (float(np.diff(at).min()) if len(at) > 1 else 1.0)
     endless = False

@@ -15,8 +15,8 @@ from rotorfault.report.style import BLUE, ORANGE, SKY, shown, unit
 
 MOST_TICKS = 9
 WIDTH_MM, MM_PER_LETTER, MM_PER_HANDLE = 160.0, 1.5, 13.0  # of a legend, as its letters are
-# From pale (all lost) to deep (all survived): lines in black and vermilion are seen on all of it.
-SURVIVAL_COLOURS = ("#FFF6D6", "#CFE4EE", SKY, "#2A85BF")
+# From pale (all failed) to deep (all successful): lines in black and vermilion are seen on all of it.
+SUCCESS_COLOURS = ("#FFF6D6", "#CFE4EE", SKY, "#2A85BF")
 FLIGHTS_COLOURS = ("#F4F4F4", "#6E6E6E")
 DIFFERENCE_COLOURS = ("#B35A00", ORANGE, "#F7F7F7", SKY, BLUE)
 
@@ -28,7 +28,7 @@ def colours(name: str, chosen: Sequence[str]) -> LinearSegmentedColormap:
 
 def places(view: View) -> Array:
     """Where the cells' middles are drawn."""
-    return view.drawn(view.positions)
+    return view.coordinates(view.positions)
 
 
 def borders(view: View) -> Array:
@@ -49,12 +49,12 @@ def ticks(view: View, most: int = MOST_TICKS) -> tuple[Array, list[str]]:
     """Places and texts of ticks: round numbers between the outermost values, or values of cells."""
     at = places(view)
     if view.even and len(view.values) > 1:
-        found = np.asarray(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(at[0], at[-1]))
+        values = np.asarray(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(at[0], at[-1]))
         slack = 1e-9 * (at[-1] - at[0])
-        found = found[(found >= at[0] - slack) & (found <= at[-1] + slack)]
-        return found, [f"{value:.10g}".replace("-", "−") for value in found]
+        values = values[(values >= at[0] - slack) & (values <= at[-1] + slack)]
+        return values, [f"{value:.10g}".replace("-", "−") for value in values]
     chosen = range(0, len(view.values), -(-len(view.values) // most))
-    return np.array([at[i] for i in chosen]), [shown(view.said(i), 14) for i in chosen]
+    return np.array([at[i] for i in chosen]), [shown(view.text(i), 14) for i in chosen]
 
 
 def scale_x(axes: Axes, view: View, most: int = MOST_TICKS) -> None:

@@ -1,6 +1,6 @@
 """Interactive maps and lines of a campaign, as plain data for plotly.js.
 
-Every cell carries what a reader may ask of it, and how to replay one of its flights: a lost one, if there is any.
+Every cell carries what a reader may ask of it, and how to replay one of its flights: one that failed, if any did.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rotorfault.campaigns.grades import GRADES
 from rotorfault.campaigns.report.axis_drawing import (
     DIFFERENCE_COLOURS,
-    SURVIVAL_COLOURS,
+    SUCCESS_COLOURS,
     borders,
     label,
     places,
@@ -35,7 +35,7 @@ GREY_BAR, GREY_LINE = "rgba(0,0,0,0.55)", "#8a8a8a"
 DASHES = {0.5: "solid", 0.99: "dot"}
 
 
-class Cell(NamedTuple):
+class CellNote(NamedTuple):
     """What is said of a cell."""
 
     where: str
@@ -49,18 +49,18 @@ class Cell(NamedTuple):
 
 
 def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
-    """Every cell of a variant, an array of `Cell` of the shape of the map."""
+    """Every cell of a variant, an array of `CellNote` of the shape of the map."""
     variant = maps.variants[k]
-    found = np.empty(variant.cell.shape, dtype=object)
+    cells = np.empty(variant.cell.shape, dtype=object)
     for at in np.ndindex(*variant.cell.shape):
-        found[at] = Cell(_where(maps, at), _said(variant, at), *_replay(variant, at, folder))
-    return found
+        cells[at] = CellNote(_where(maps, at), _numbers(variant, at), *_replay(variant, at, folder))
+    return cells
 
 
 def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
-    """Every cell of a pair of variants, an array of `Cell` of the shape of the map."""
+    """Every cell of a pair of variants, an array of `CellNote` of the shape of the map."""
     pairing, cell = maps.pairings[k], maps.variants[0].cell
-    found = np.empty(cell.shape, dtype=object)
+    cells = np.empty(cell.shape, dtype=object)
     for at in np.ndindex(*cell.shape):
         number = max(int(pairing.first_apart[at]), 0)
         commands = tuple(
@@ -68,25 +68,27 @@ def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
             for name in (pairing.first, pairing.second)
         )
         apart = (
-            "the first flight that only one of them survived" if pairing.first_apart[at] >= 0 else "the first flight"
+            "the first flight in which only one was successful"
+            if pairing.first_apart[at] >= 0
+            else "the first flight"
         )
-        found[at] = Cell(_where(maps, at), _compared(pairing, at), commands, apart)
-    return found
+        cells[at] = CellNote(_where(maps, at), _comparison(pairing, at), commands, apart)
+    return cells
 
 
-def survival_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -> Spec:
-    """Map of a variant's survival, with boundaries and limits of hover."""
+def success_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -> Spec:
+    """Map of a variant's success rate, with boundaries and limits of hover."""
     variant = maps.variants[k]
-    data = [_heat(maps, part, variant.survival, cells, SURVIVAL_COLOURS, (0.0, 1.0), "survival")]
-    if (found := edges(maps, k, part)) is not None:
+    data = [_heat(maps, part, variant.success_rate, cells, SUCCESS_COLOURS, (0.0, 1.0), "success rate")]
+    if (edge := edges(maps, k, part)) is not None:
         for text, lines, dash in (
-            ("limit of hover, yaw held", found.with_yaw, "solid"),
-            ("limit of hover, yaw given up", found.without_yaw, "dash"),
+            ("limit of hover, yaw held", edge.with_yaw, "solid"),
+            ("limit of hover, yaw given up", edge.without_yaw, "dash"),
         ):
             data += _curve(maps, lines, text, {"color": VERMILION, "width": 2, "dash": dash})
     for level in LEVELS:
         crossed = crossings(maps, variant, part, level)
-        name = f"{100.0 * level:g} % survive"
+        name = f"{100.0 * level:g} % success"
         data += _curve(maps, crossed.lines, name, {"color": BLACK, "width": 2, "dash": DASHES[level]})
         data += _bars(maps, crossed, name)
     return {"data": data, "layout": _layout(maps.views)}
@@ -109,15 +111,15 @@ def difference_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]
     return {"data": data, "layout": _layout(maps.views)}
 
 
-def survival_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
-    """A variant's survival along the one axis of a study."""
+def success_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
+    """A variant's success rate along the one axis of a study."""
     variant = maps.variants[k]
-    data = [_line(maps, variant.survival, variant.lower, variant.upper, cells, "survival")]
-    layout = _layout(maps.views[:1], "survival (–)", (-0.03, 1.05))
-    found = edges(maps, k, Slice("", (slice(None),)))
-    for dash, lines in zip(("solid", "dash"), found or (), strict=False):
+    data = [_line(maps, variant.success_rate, variant.lower, variant.upper, cells, "success rate")]
+    layout = _layout(maps.views[:1], "success rate (–)", (-0.03, 1.05))
+    edge = edges(maps, k, Slice("", (slice(None),)))
+    for dash, lines in zip(("solid", "dash"), edge or (), strict=False):
         for point in lines:
-            at = float(maps.views[0].drawn(point[:, 0])[0])
+            at = float(maps.views[0].coordinates(point[:, 0])[0])
             line = {"color": VERMILION, "width": 2, "dash": dash}
             layout["shapes"] += [
                 {"type": "line", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1, "line": line}
@@ -131,7 +133,7 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
     line = _line(maps, *pairing.difference, cells, "difference")
     line["marker"]["color"] = [BLUE if yes else "white" for yes in pairing.significant]
     line["marker"]["line"] = {"color": BLUE, "width": 1.5}
-    return {"data": [line], "layout": _layout(maps.views[:1], "difference of survival (–)", (-1.05, 1.05))}
+    return {"data": [line], "layout": _layout(maps.views[:1], "difference of success rates (–)", (-1.05, 1.05))}
 
 
 # ------------------------------------------------------------------------------------------------ what cells say
@@ -139,20 +141,20 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
 
 def _where(maps: Maps, at: tuple[int, ...]) -> str:
     units = [f" {view.unit}" if view.unit not in ("", "1") else "" for view in maps.views]
-    return ", ".join(f"{v.title} {v.said(i)}{u}" for v, i, u in zip(maps.views, at, units, strict=True))
+    return ", ".join(f"{v.title} {v.text(i)}{u}" for v, i, u in zip(maps.views, at, units, strict=True))
 
 
-def _said(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
-    flights, survived = int(variant.flights[at]), int(variant.survived[at])
+def _numbers(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
+    flights, successes = int(variant.flights[at]), int(variant.successes[at])
     if not flights:
         return ("no flights", f"hover physically possible: {possible_text(variant.possible, at)}")
     grades = ", ".join(f"{name} {n}" for name, n in zip(GRADES, _of(variant.grades, at), strict=True) if n)
     return (
-        f"survived {survived} of {flights}: {percent(variant.survival[at])} "
+        f"success {successes} of {flights}: {percent(variant.success_rate[at])} "
         f"({percent(variant.lower[at])} to {percent(variant.upper[at])})",
         grades,
         f"recovery time: {_quantiles(_of(variant.recovery, at), 's', 'never')}",
-        f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'lost')}",
+        f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'failed')}",
         f"hover physically possible: {possible_text(variant.possible, at)}",
     )
 
@@ -162,14 +164,14 @@ def _of(values: NDArray[Any], at: tuple[int, ...]) -> NDArray[Any]:
     return np.array([each[at] for each in values])
 
 
-def _compared(pairing: Pairing, at: tuple[int, ...]) -> tuple[str, ...]:
+def _comparison(pairing: Pairing, at: tuple[int, ...]) -> tuple[str, ...]:
     pairs = int(pairing.counts.pairs[at])
     if not pairs:
         return ("no common flights",)
     low, high = (signed(each[at]) for each in (pairing.difference.lower, pairing.difference.upper))
     return (
         f"{pairing.first} less {pairing.second}: {signed(pairing.difference.estimate[at])} ({low} to {high})",
-        f"of {pairs} common flights {int(pairing.counts.only_first[at])} only by {pairing.first}, "
+        f"of {pairs} common flights {int(pairing.counts.only_first[at])} successful only by {pairing.first}, "
         f"{int(pairing.counts.only_second[at])} only by {pairing.second}",
         f"p = {pairing.p_value[at]:.2g} after Holm's correction"
         f"{', significant' if pairing.significant[at] else ''}",
@@ -177,23 +179,24 @@ def _compared(pairing: Pairing, at: tuple[int, ...]) -> tuple[str, ...]:
 
 
 def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tuple[str, ...], str]:
-    lost = int(variant.flights[at] - variant.survived[at])
-    if lost:
-        return (_command(folder, f"--flight {variant.first_lost[at]}"),), f"the first of {lost} lost flights"
+    failures = int(variant.flights[at] - variant.successes[at])
+    if failures:
+        command = _command(folder, f"--flight {variant.first_failure[at]}")
+        return (command,), f"the first of {failures} flights that failed"
     command = _command(folder, f"--cell {variant.cell[at]} --variant {shlex.quote(variant.label)}")
-    return (command,), "the first flight; none was lost" if variant.flights[at] else "the flight that would be first"
+    return (command,), "the first flight; none failed" if variant.flights[at] else "the flight that would be first"
 
 
 def _command(folder: Path, options: str) -> str:
     return f"rotorfault replay {shlex.quote(str(folder))} {options}"
 
 
-def possible_text(found: Limits | None, at: tuple[int, ...]) -> str:
+def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
     """Whether hover is possible, in words."""
-    if found is None:
+    if possible is None:
         return "not known"
     words = {1.0: "yes", 0.0: "no"}
-    held, free = (words.get(float(each[at]), "depends on what is drawn") for each in found)
+    held, free = (words.get(float(each[at]), "depends on what is drawn") for each in possible)
     return held if held == free else f"with yaw held {held}, given up {free}"
 
 
@@ -274,20 +277,23 @@ def _curve(maps: Maps, lines: Sequence[Array], name: str, style: Spec) -> list[S
     xs: list[float | None] = []
     ys: list[float | None] = []
     for line in lines:
-        xs += [*x.drawn(line[:, 0]).round(5).tolist(), None]
-        ys += [*y.drawn(line[:, 1]).round(5).tolist(), None]
+        xs += [*x.coordinates(line[:, 0]).round(5).tolist(), None]
+        ys += [*y.coordinates(line[:, 1]).round(5).tolist(), None]
     return [{"type": "scatter", "mode": "lines", "x": xs, "y": ys, "line": style, "hoverinfo": "skip", "name": name}]
 
 
-def _bars(maps: Maps, found: Crossings, name: str) -> list[Spec]:
+def _bars(maps: Maps, crossed: Crossings, name: str) -> list[Spec]:
     """Intervals of crossings; where open, no bar."""
     x, y = maps.views[:2]
     traces = []
     for axis, view in enumerate((x, y)):
-        mine = found.along == axis
-        at = np.column_stack([x.drawn(found.points[mine, 0]), y.drawn(found.points[mine, 1])])
+        which = crossed.along == axis
+        at = np.column_stack([x.coordinates(crossed.points[which, 0]), y.coordinates(crossed.points[which, 1])])
         middle = at[:, axis]
-        ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower[mine], found.upper[mine])]
+        ends = [
+            np.where(np.isnan(end), middle, view.coordinates(end))
+            for end in (crossed.lower[which], crossed.upper[which])
+        ]
         bar = {
             "type": "data", "symmetric": False, "color": GREY_BAR, "thickness": 1, "width": 2,
             "arrayminus": (middle - ends[0]).round(5).tolist(), "array": (ends[1] - middle).round(5).tolist(),
@@ -305,10 +311,10 @@ def _bars(maps: Maps, found: Crossings, name: str) -> list[Spec]:
 
 def _nullable(values: Array) -> list[Any]:
     """Nested lists with None for NaN, which JSON does not have."""
-    found = np.round(values, 5).astype(object)
-    found[~np.isfinite(values)] = None
-    listed: list[Any] = found.tolist()
-    return listed
+    numbers = np.round(values, 5).astype(object)
+    numbers[~np.isfinite(values)] = None
+    nested: list[Any] = numbers.tolist()
+    return nested
 
 
 def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | None = None) -> Spec:
@@ -333,9 +339,9 @@ def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | 
 
 def _axis(view: View) -> Spec:
     edges = borders(view)
-    found: Spec = {
+    axis: Spec = {
         "title": {"text": label(view)}, "zeroline": False, "showgrid": False, "ticks": "outside",
         "range": [float(edges[0]), float(edges[-1])],
     }  # fmt: skip
     at, texts = ticks(view)
-    return found | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": texts}
+    return axis | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": texts}

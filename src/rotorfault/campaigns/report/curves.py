@@ -1,4 +1,4 @@
-"""Curves on a map: where survival crosses a level, with intervals, and where hover stops to be possible.
+"""Curves on a map: where the success rate crosses a level, with intervals, and where hover stops being possible.
 
 A map of three or four axes is looked at in slices, one for each combination of the further axes.
 """
@@ -37,20 +37,20 @@ class Slice(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Where survival crosses a level.
+    """Where the success rate crosses a level.
 
     Attributes
     ----------
     level : float
     lines : list of ndarray, shape (points, 2)
-        Between cells straight, as `rotorfault.campaigns.sampling.boundary` has it; none on maps with names on an axis, and
-        for a study with one axis.
+        Between cells straight, as `rotorfault.campaigns.sampling.boundary` has it; none on maps with names on an
+        axis, and for a study with one axis.
     points : ndarray, shape (crossings, 2)
-        On lines of the grid; where survival changes along both axes alike, on both.
+        On lines of the grid; where the success rate changes along both axes alike, on both.
     lower, upper : ndarray, shape (crossings,)
         Interval along the crossing's axis; NaN where it is open.
     along : ndarray of int, shape (crossings,)
-        Axis, 0 or 1, along which survival crosses the level: of the two the one on which it changes faster there, so
+        Axis, 0 or 1, along which it crosses the level: of the two the one on which it changes faster there, so
         that intervals lie across the boundary and not beside it.
     """
 
@@ -63,7 +63,7 @@ class Crossings(NamedTuple):
 
 
 class Edges(NamedTuple):
-    """Where hover stops to be possible: curves, or for a study with one axis places on it as lists of one point."""
+    """Where hover stops being possible: curves, or for a study with one axis places on it as lists of one point."""
 
     with_yaw: list[Array]
     without_yaw: list[Array]
@@ -73,70 +73,70 @@ def slices(maps: Maps) -> tuple[list[Slice], int]:
     """The slices that are shown, evenly picked if there are too many, and how many there are."""
     flat = min(len(maps.views), 2)
     further = maps.views[flat:]
-    found = [
+    every = [
         Slice(
-            ", ".join(_said(view, i) for view, i in zip(further, places, strict=True)), (slice(None),) * flat + places
+            ", ".join(_value(view, i) for view, i in zip(further, places, strict=True)),
+            (slice(None),) * flat + places,
         )
         for places in itertools.product(*(range(len(view.values)) for view in further))
     ]
-    if len(found) <= MOST_SLICES:
-        return found, len(found)
-    return [found[i] for i in np.linspace(0, len(found) - 1, MOST_SLICES).round().astype(int)], len(found)
+    if len(every) <= MOST_SLICES:
+        return every, len(every)
+    return [every[i] for i in np.linspace(0, len(every) - 1, MOST_SLICES).round().astype(int)], len(every)
 
 
-def _said(view: View, place: int) -> str:
-    return f"{view.title} {view.said(place)}{f' {view.unit}' if view.unit not in ('', '1') else ''}"
+def _value(view: View, place: int) -> str:
+    return f"{view.title} {view.text(place)}{f' {view.unit}' if view.unit not in ('', '1') else ''}"
 
 
 def crossings(maps: Maps, variant: VariantMap, part: Slice, level: float) -> Crossings:
-    """Where a variant's survival crosses a level in a slice."""
+    """Where a variant's success rate crosses a level in a slice."""
     x = maps.views[0]
-    survived, flights = part.of(variant.survived), part.of(variant.flights)
+    successes, flights = part.of(variant.successes), part.of(variant.flights)
     bounds = Interval(part.of(variant.lower), part.of(variant.upper))
-    if survived.ndim == 1:
+    if successes.ndim == 1:
         if not x.numeric:
             return _nothing(level)
         row = Interval(bounds.lower[None], bounds.upper[None])
-        found = boundary(survived[None], flights[None], x.positions, level, axis=1, interval=row)
-        return Crossings(level, [], *_listed(found, np.array([level]), 0))
-    views, survival = maps.views[:2], part.of(variant.survival)
+        crossed = boundary(successes[None], flights[None], x.positions, level, axis=1, interval=row)
+        return Crossings(level, [], *_points(crossed, np.array([level]), 0))
+    views, rate = maps.views[:2], part.of(variant.success_rate)
     parts = []
     for axis, view in enumerate(views):
         if view.numeric:
-            found = boundary(survived, flights, view.positions, level, axis=axis, interval=bounds)
-            points, lower, upper, along = _listed(found, views[1 - axis].positions, axis)
-            kept = _faster(views, survival, points, axis)
-            parts.append((points[kept], lower[kept], upper[kept], along[kept]))
+            crossed = boundary(successes, flights, view.positions, level, axis=axis, interval=bounds)
+            points, lower, upper, along = _points(crossed, views[1 - axis].positions, axis)
+            across = _faster(views, rate, points, axis)
+            parts.append((points[across], lower[across], upper[across], along[across]))
     if not parts:
         return _nothing(level)
-    drawn = all(view.numeric and len(view.values) > 1 for view in views)
+    to_scale = all(view.numeric and len(view.values) > 1 for view in views)
     x_positions, y_positions = (view.positions for view in views)
-    lines = _contours(x_positions, y_positions, survival, level) if drawn else []
+    lines = _contours(x_positions, y_positions, rate, level) if to_scale else []
     return Crossings(level, lines, *(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def _faster(views: tuple[View, ...], survival: Array, points: Array, axis: int) -> NDArray[np.bool_]:
-    """Which crossings along an axis lie across the boundary: survival changes there no faster along the other one."""
+def _faster(views: tuple[View, ...], rate: Array, points: Array, axis: int) -> NDArray[np.bool_]:
+    """Which crossings along an axis lie across the boundary: the rate changes there no faster along the other one."""
     other = views[1 - axis]
     if not other.numeric or len(other.values) < 2:
         return np.ones(len(points), dtype=bool)
-    beside = np.nan_to_num(np.gradient(survival, axis=1 - axis))
+    beside = np.nan_to_num(np.gradient(rate, axis=1 - axis))
     below = (
         np.searchsorted(views[axis].positions, points[:, axis], side="left").clip(1, len(views[axis].values) - 1) - 1
     )
     line = np.searchsorted(other.positions, points[:, 1 - axis])
     low, high = ((at, line) if axis == 0 else (line, at) for at in (below, below + 1))
-    step = np.abs(survival[high] - survival[low])
-    kept = step >= 0.5 * np.abs(beside[low] + beside[high])
-    return np.asarray(kept)
+    step = np.abs(rate[high] - rate[low])
+    return np.asarray(step >= 0.5 * np.abs(beside[low] + beside[high]))
 
 
-def _listed(found: Boundary, other: Array, axis: int) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+def _points(crossed: Boundary, other: Array, axis: int) -> tuple[Array, Array, Array, NDArray[np.int64]]:
     """Points, intervals and axes of crossings."""
-    line, crossing = np.nonzero(np.isfinite(found.position))
+    line, crossing = np.nonzero(np.isfinite(crossed.position))
     points = np.empty((len(line), 2))
-    points[:, axis], points[:, 1 - axis] = found.position[line, crossing], other[line]
-    return points, found.lower[line, crossing], found.upper[line, crossing], np.full(len(line), axis)
+    points[:, axis], points[:, 1 - axis] = crossed.position[line, crossing], other[line]
+    return points, crossed.lower[line, crossing], crossed.upper[line, crossing], np.full(len(line), axis)
 
 
 def _nothing(level: float) -> Crossings:
@@ -144,12 +144,12 @@ def _nothing(level: float) -> Crossings:
 
 
 def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
-    """Where hover stops to be possible in a slice, between cells too, for the middle of what is drawn.
+    """Where hover stops being possible in a slice, between cells too, for the middle of what is drawn.
 
     Returns
     -------
     Edges or None
-        None where it cannot be told, or an axis of the slice has names instead of numbers.
+        None where that is not known, or an axis of the slice has names instead of numbers.
     """
     flat = maps.views[:2]
     if not all(view.numeric and len(view.values) > 1 for view in flat) or maps.variants[variant].possible is None:
@@ -157,16 +157,16 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
     further = {view.name: view.values[place] for view, place in zip(maps.views[2:], part.at[2:], strict=True)}
 
     def possible(points: Array) -> Limits | None:
-        given = {view.name: column for view, column in zip(flat, points.T, strict=True)}
-        given |= {name: np.full(len(points), value) for name, value in further.items()}
-        return limits(maps.study, variant, given, middle=True)
+        values = {view.name: column for view, column in zip(flat, points.T, strict=True)}
+        values |= {name: np.full(len(points), value) for name, value in further.items()}
+        return limits(maps.study, variant, values, middle=True)
 
     fine = [np.linspace(view.positions[0], view.positions[-1], FINE) for view in flat]
     grid = np.stack(np.meshgrid(*fine, indexing="ij"), axis=-1)
-    if (found := possible(grid.reshape(-1, len(flat)))) is None:
+    if (indicators := possible(grid.reshape(-1, len(flat)))) is None:
         return None
     lines = []
-    for k, field in enumerate(found):
+    for k, field in enumerate(indicators):
         shaped = field.reshape(grid.shape[:-1])
         coarse = _steps(fine[0], shaped) if len(flat) == 1 else _contours(fine[0], fine[1], shaped, 0.5)
         lines.append([_refined(line, fine, partial(_indicator, possible, k)) for line in coarse])
@@ -174,9 +174,9 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
 
 
 def _indicator(possible: Callable[[Array], Limits | None], k: int, points: Array) -> Array:
-    found = possible(points)
-    assert found is not None  # as it was for the whole grid
-    return found[k]
+    indicators = possible(points)
+    assert indicators is not None  # as it was for the whole grid
+    return indicators[k]
 
 
 def _steps(x: Array, field: Array) -> list[Array]:

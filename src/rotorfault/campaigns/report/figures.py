@@ -1,6 +1,6 @@
-"""Figures of a campaign: survival, differences between variants, outcomes, recovery.
+"""Figures of a campaign: success rates, differences between variants, grades, recovery.
 
-With two axes survival is a map, with one a line, with more a map for each combination of the further axes.
+With two axes the success rate is a map, with one a line, with more a map for each combination of the further axes.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import re
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from rotorfault.campaigns.report.along_figure import outcome_figure, recovery_figure
+from rotorfault.campaigns.report.along_figure import grade_figure, recovery_figure
 from rotorfault.campaigns.report.curves import slices
-from rotorfault.campaigns.report.line_figure import difference_lines, survival_lines
-from rotorfault.campaigns.report.map_figure import Panel, difference_maps, survival_maps
+from rotorfault.campaigns.report.line_figure import difference_lines, success_lines
+from rotorfault.campaigns.report.map_figure import MapPanel, difference_maps, success_maps
 from rotorfault.campaigns.report.maps import Maps
 from rotorfault.report.style import STYLE
 
@@ -24,44 +24,44 @@ def draw(maps: Maps) -> dict[str, Figure]:
     Returns
     -------
     dict of str to Figure
-        ``survival`` and, with two variants or more, ``difference``; with three axes or more one of them for each
-        variant or pair, ``survival-NAME``; ``outcomes`` and ``recovery``. All 16 cm wide.
+        ``success`` and, with two variants or more, ``difference``; with three axes or more one of them for each
+        variant or pair, ``success-NAME``; ``grades`` and ``recovery``. All 16 cm wide.
     """
     with rc_context(STYLE):
-        made = _lines(maps) if len(maps.views) == 1 else _maps(maps)
-        made["outcomes"] = outcome_figure(maps)
-        made["recovery"] = recovery_figure(maps)
-    return made
+        figures = _lines(maps) if len(maps.views) == 1 else _maps(maps)
+        figures["grades"] = grade_figure(maps)
+        figures["recovery"] = recovery_figure(maps)
+    return figures
 
 
 def _lines(maps: Maps) -> dict[str, Figure]:
-    made = {"survival": survival_lines(maps)}
+    figures = {"success": success_lines(maps)}
     if maps.pairings:
-        made["difference"] = difference_lines(maps)
-    return made
+        figures["difference"] = difference_lines(maps)
+    return figures
 
 
 def _maps(maps: Maps) -> dict[str, Figure]:
     parts, _ = slices(maps)
     variants = [
-        [Panel(k, part, part.title or variant.label) for part in parts] for k, variant in enumerate(maps.variants)
+        [MapPanel(k, part, part.title or variant.label) for part in parts] for k, variant in enumerate(maps.variants)
     ]
     pairs = [
-        [Panel(k, part, part.title or _less(pair.first, pair.second)) for part in parts]
+        [MapPanel(k, part, part.title or _less(pair.first, pair.second)) for part in parts]
         for k, pair in enumerate(maps.pairings)
     ]
     if len(parts) == 1:
-        made = {"survival": survival_maps(maps, [panel for each in variants for panel in each])}
+        figures = {"success": success_maps(maps, [panel for each in variants for panel in each])}
         if pairs:
-            made["difference"] = difference_maps(maps, [panel for each in pairs for panel in each])
-        return made
-    made = {}
+            figures["difference"] = difference_maps(maps, [panel for each in pairs for panel in each])
+        return figures
+    figures = {}
     for variant, panels in zip(maps.variants, variants, strict=True):
-        made[f"survival-{_file(variant.label)}"] = survival_maps(maps, panels, variant.label)
+        figures[f"success-{_file(variant.label)}"] = success_maps(maps, panels, variant.label)
     for pair, panels in zip(maps.pairings, pairs, strict=True):
         name = f"difference-{_file(pair.first)}-{_file(pair.second)}"
-        made[name] = difference_maps(maps, panels, f"{pair.first} less {pair.second}")
-    return made
+        figures[name] = difference_maps(maps, panels, f"{pair.first} less {pair.second}")
+    return figures
 
 
 def _less(first: str, second: str) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.analysis.hover import hover_margin
-from rotorfault.campaigns.sampling.axes import Columns, columns
+from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.campaigns.study import Draw, Study
 from rotorfault.maths.geometry import PerRotor, Vec3
@@ -56,9 +56,9 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
     Returns
     -------
     Limits or None
-        Each of shape (N,). None where it cannot be told: faults or winds of other kinds, or too many draws.
+        Each of shape (N,). None where it is not known: faults or winds of other kinds, or too many draws.
     """
-    scenario = study.scenario_of(variant)
+    scenario = study.scenarios[variant]
     count = len(next(iter(values.values())))
     ends = [_ends(draw, middle) for draw in study.draw if _matters(draw)]
     if not _understood(scenario, study) or np.prod([len(e) for e in ends], initial=1.0) > MOST_ENDS:
@@ -66,10 +66,10 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
     names = [draw.name for draw in study.draw if _matters(draw)]
     answers = []
     for chosen in itertools.product(*ends):
-        drawn = {name: np.full(count, value) for name, value in zip(names, chosen, strict=True)}
-        answers.append(_possible(scenario, columns({**values, **drawn}), count))
-    found = np.array(answers)  # (ends, 2, N)
-    every, some = found.min(axis=0), found.max(axis=0)
+        draws = {name: np.full(count, value) for name, value in zip(names, chosen, strict=True)}
+        answers.append(_possible(scenario, columns({**values, **draws}), count))
+    possible = np.array(answers)  # (ends, 2, N)
+    every, some = possible.min(axis=0), possible.max(axis=0)
     return Limits(*np.where(every == some, every, every if middle else np.nan))
 
 
@@ -77,7 +77,7 @@ def _matters(draw: Draw) -> bool:
     """Whether it changes losses, wind or vehicle; most draws only change what happens on the way."""
     any_value = _ends(draw, middle=True)[0]
     changed = columns({draw.name: np.array([any_value])})
-    return any(_known(key) or not _harmless(key) for key in changed)
+    return any(_decides(key) or not _harmless(key) for key in changed)
 
 
 def _ends(draw: Draw, middle: bool) -> list[Any]:
@@ -90,7 +90,7 @@ def _ends(draw: Draw, middle: bool) -> list[Any]:
     return [0.5 * (low + high)] if middle else [low, high]
 
 
-def _known(key: str) -> bool:
+def _decides(key: str) -> bool:
     """Keys of a scenario whose values are taken over."""
     last = key.rpartition(".")[2]
     return (
@@ -116,50 +116,47 @@ def _understood(scenario: Scenario, study: Study) -> bool:
     return (
         scenario[WIND].kind in WINDS
         and all(fault.kind in LASTING for fault in scenario.all(FAULT))
-        and all(_known(key) or _harmless(key) for key in varied)
+        and all(_decides(key) or _harmless(key) for key in varied)
     )
 
 
-def _possible(scenario: Scenario, given: Columns, count: int) -> Array:
+def _possible(scenario: Scenario, settings: Columns, count: int) -> Array:
     """Indicators with and without yaw, shape (2, N)."""
     effect = [np.ones(count) for _ in range(4)]
     for k, fault in enumerate(scenario.all(FAULT)):
-        loss = _of(given, f"fault.{k}.loss", getattr(fault.settings, "loss", 1.0))
-        onset = _of(given, f"fault.{k}.{LASTING[fault.kind]}", getattr(fault.settings, LASTING[fault.kind]))
-        rotor = _of(given, f"fault.{k}.rotor", fault.settings.rotor)
+        onset_key = LASTING[fault.kind]
+        loss = settings.get(f"fault.{k}.loss", getattr(fault.settings, "loss", 1.0))
+        onset = settings.get(f"fault.{k}.{onset_key}", getattr(fault.settings, onset_key))
+        rotor = settings.get(f"fault.{k}.rotor", fault.settings.rotor)
         lasting = np.where(onset < scenario.duration, 1.0 - loss, 1.0)
         for i in range(4):
             effect[i] = effect[i] * np.where(rotor == i + 1, lasting, 1.0)
     losses = PerRotor.of(1.0 - each for each in effect)
     still = scenario[WIND].kind == "none"
     wind = (0.0, 0.0, 0.0) if still else scenario[WIND].settings.velocity_W
-    wind_W = Vec3(*(_of(given, f"wind.velocity_W.{i}", wind[i]) + np.zeros(count) for i in range(3)))
-    found = np.full((2, count), np.nan)
-    for vehicle, which in _vehicles(scenario, given, count):
-        picked = {key: np.broadcast_to(column, (count,))[which] for key, column in given.items()}
+    wind_W = Vec3(*(settings.get(f"wind.velocity_W.{i}", wind[i]) + np.zeros(count) for i in range(3)))
+    possible = np.full((2, count), np.nan)
+    for vehicle, which in _vehicles(scenario, settings, count):
+        part = {key: np.broadcast_to(column, (count,))[which] for key, column in settings.items()}
         margin = hover_margin(
-            _true(vehicle, scenario, picked), losses.map(lambda x, w=which: x[w]),
+            _true(vehicle, scenario, part), losses.map(lambda x, w=which: x[w]),
             Vec3(*(each[which] for each in (wind_W.x, wind_W.y, wind_W.z))),
         )  # fmt: skip
-        found[0, which], found[1, which] = margin.with_yaw, margin.without_yaw
-    return found
+        possible[0, which], possible[1, which] = margin.with_yaw, margin.without_yaw
+    return possible
 
 
-def _vehicles(scenario: Scenario, given: Columns, count: int) -> list[tuple[Vehicle, NDArray[np.bool_]]]:
+def _vehicles(scenario: Scenario, settings: Columns, count: int) -> list[tuple[Vehicle, NDArray[np.bool_]]]:
     """Each vehicle, and where it flies."""
-    if "vehicle" not in given:
+    if "vehicle" not in settings:
         return [(scenario.vehicle.vehicle, np.ones(count, dtype=bool))]
-    column = np.broadcast_to(given["vehicle"], (count,))
+    column = np.broadcast_to(settings["vehicle"], (count,))
     return [(load_vehicle(str(name)).vehicle, column == name) for name in np.unique(column)]
 
 
-def _true(vehicle: Vehicle, scenario: Scenario, given: Columns) -> Vehicle:
+def _true(vehicle: Vehicle, scenario: Scenario, settings: Columns) -> Vehicle:
     factors = {
-        name: _of(given, f"mismatch.{name}", getattr(scenario.mismatch, name))
+        name: settings.get(f"mismatch.{name}", getattr(scenario.mismatch, name))
         for name in ("mass", "rotor_gain", "linear_drag")
     }
     return vehicle._replace(**{name: getattr(vehicle, name) * factor for name, factor in factors.items()})
-
-
-def _of(given: Columns, key: str, otherwise: Any) -> Any:
-    return given.get(key, otherwise)

@@ -1,4 +1,4 @@
-"""Studies with one axis: survival and differences as lines with intervals."""
+"""Studies with one axis: success rates and differences as lines with intervals."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def look(k: int) -> dict[str, Any]:
     return {"color": COLOURS[k % len(COLOURS)], "linestyle": LINES[k // len(COLOURS) % len(LINES)]}
 
 
-def survival_lines(maps: Maps) -> Figure:
-    """Survival with the intervals of its cells, and where it crosses the levels; below, the number of flights."""
+def success_lines(maps: Maps) -> Figure:
+    """Success rates with the intervals of cells, and where they cross the levels; below, the number of flights."""
     figure = new_figure(11.0)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3.0, 1.0])
     x = maps.views[0]
@@ -37,11 +37,11 @@ def survival_lines(maps: Maps) -> Figure:
     for k, variant in enumerate(maps.variants):
         style = look(k)
         line = style if x.numeric else {**style, "linestyle": "none"}
-        above.plot(at, variant.survival, marker="o", markersize=3.0, **line)
-        reach = [variant.survival - variant.lower, variant.upper - variant.survival]
+        above.plot(at, variant.success_rate, marker="o", markersize=3.0, **line)
+        reach = [variant.success_rate - variant.lower, variant.upper - variant.success_rate]
         above.errorbar(
             at + beside[k],
-            variant.survival,
+            variant.success_rate,
             yerr=np.nan_to_num(reach),
             fmt="none",
             ecolor=style["color"],
@@ -55,7 +55,7 @@ def survival_lines(maps: Maps) -> Figure:
         above.axhline(level, color=GREY, linewidth=0.6, zorder=1.0)
     _limits(above, maps, handles)
     above.set_ylim(-0.03, 1.05)
-    above.set_ylabel("survival (–)")
+    above.set_ylabel("success rate (–)")
     below.set_ylim(0.0, 1.08 * max(int(variant.flights.max()) for variant in maps.variants))
     below.set_ylabel("flights (–)")
     _finish(figure, below, maps, handles)
@@ -63,7 +63,7 @@ def survival_lines(maps: Maps) -> Figure:
 
 
 def difference_lines(maps: Maps) -> Figure:
-    """Differences of survival with the intervals of their cells; filled where significant."""
+    """Differences of success rates with the intervals of their cells; filled where significant."""
     figure = new_figure(7.5)
     axes = figure.subplots()
     at = places(maps.views[0])
@@ -83,7 +83,7 @@ def difference_lines(maps: Maps) -> Figure:
     )
     axes.axhline(0.0, color=GREY, linewidth=0.6, zorder=1.0)
     axes.set_ylim(-1.05, 1.05)
-    axes.set_ylabel("difference of survival (–)")
+    axes.set_ylabel("difference of success rates (–)")
     _finish(figure, axes, maps, handles)
     return figure
 
@@ -101,28 +101,30 @@ def _beside(maps: Maps) -> list[float]:
 
 def _crossing(axes: Axes, maps: Maps, k: int, level: float) -> None:
     """The interval of a crossing lies on the level's line."""
-    x, found = maps.views[0], crossings(maps, maps.variants[k], LINE, level)
-    for point, lower, upper in zip(found.points[:, 0], found.lower, found.upper, strict=True):
-        ends = [x.drawn(np.array([point if np.isnan(end) else end]))[0] for end in (lower, upper)]
+    x, crossed = maps.views[0], crossings(maps, maps.variants[k], LINE, level)
+    for point, lower, upper in zip(crossed.points[:, 0], crossed.lower, crossed.upper, strict=True):
+        ends = [x.coordinates(np.array([point if np.isnan(end) else end]))[0] for end in (lower, upper)]
         colour = look(k)["color"]
         axes.plot(ends, [level, level], color=colour, linewidth=2.4, alpha=0.45, solid_capstyle="butt")
-        axes.plot(x.drawn(np.array([point])), [level], color=colour, marker="|", markersize=7.0, markeredgewidth=1.4)
+        axes.plot(
+            x.coordinates(np.array([point])), [level], color=colour, marker="|", markersize=7.0, markeredgewidth=1.4
+        )
 
 
 def _limits(axes: Axes, maps: Maps, handles: dict[str, Artist]) -> None:
     """Limits of hover; of variants that share them once."""
-    drawn: set[tuple[str, float]] = set()
+    lines: set[tuple[str, float]] = set()
     for k in range(len(maps.variants)):
-        found = edges(maps, k, LINE)
+        edge = edges(maps, k, LINE)
         for text, style, places_of in (
-            ("limit of hover, yaw held", WITH_YAW, found.with_yaw if found else []),
-            ("limit of hover, yaw given up", WITHOUT_YAW, found.without_yaw if found else []),
+            ("limit of hover, yaw held", WITH_YAW, edge.with_yaw if edge else []),
+            ("limit of hover, yaw given up", WITHOUT_YAW, edge.without_yaw if edge else []),
         ):
             for point in places_of:
-                if (key := (text, round(float(point[0, 0]), 9))) not in drawn:
-                    axes.axvline(float(maps.views[0].drawn(point[:, 0])[0]), **style)
+                if (key := (text, round(float(point[0, 0]), 9))) not in lines:
+                    axes.axvline(float(maps.views[0].coordinates(point[:, 0])[0]), **style)
                     handles[text] = Line2D([], [], **style)
-                    drawn.add(key)
+                    lines.add(key)
 
 
 def _finish(figure: Figure, lowest: Axes, maps: Maps, handles: dict[str, Artist]) -> None:

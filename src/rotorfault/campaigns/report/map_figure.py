@@ -1,4 +1,4 @@
-"""Maps: survival with its boundaries, number of flights, differences between two variants."""
+"""Maps: success rates with their boundaries, number of flights, differences between two variants."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from rotorfault.campaigns.report.axis_drawing import (
     DIFFERENCE_COLOURS,
     FLIGHTS_COLOURS,
-    SURVIVAL_COLOURS,
+    SUCCESS_COLOURS,
     borders,
     colours,
     columns,
@@ -41,7 +41,7 @@ DOTS: dict[str, Any] = {"color": BLACK, "marker": "o", "markersize": 2.4, "lines
 EMPTY = "0.85"
 
 
-class Panel(NamedTuple):
+class MapPanel(NamedTuple):
     """One map of a figure."""
 
     which: int  # place of the variant, or of the pair
@@ -49,59 +49,59 @@ class Panel(NamedTuple):
     title: str
 
 
-def survival_maps(maps: Maps, panels: Sequence[Panel], title: str = "") -> Figure:
-    """Survival with boundaries and limits; below each map the number of flights."""
+def success_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Figure:
+    """Success rates with boundaries and limits; below each map the number of flights."""
     figure, grid = _grid(maps, panels, title)
     most = max(int(variant.flights.max()) for variant in maps.variants)
-    seen: dict[str, Artist] = {}
-    shown_maps: dict[str, QuadMesh] = {}
+    handles: dict[str, Artist] = {}
+    meshes: dict[str, QuadMesh] = {}
     for panel, axes, below in grid:
         variant = maps.variants[panel.which]
-        survival, flights = panel.part.of(variant.survival), panel.part.of(variant.flights)
-        shown_maps["survival"] = _mesh(axes, maps, survival, SURVIVAL_COLOURS, (0.0, 1.0))
-        counted = np.where(flights > 0, flights, np.nan)
-        shown_maps["flights"] = _mesh(below, maps, counted, FLIGHTS_COLOURS, (0.0, float(most)))
-        if np.isnan(survival).any():
-            seen["no flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
-        _limits(axes, maps, panel, seen)
+        rate, flights = panel.part.of(variant.success_rate), panel.part.of(variant.flights)
+        meshes["success rate"] = _mesh(axes, maps, rate, SUCCESS_COLOURS, (0.0, 1.0))
+        flown = np.where(flights > 0, flights, np.nan)
+        meshes["flights"] = _mesh(below, maps, flown, FLIGHTS_COLOURS, (0.0, float(most)))
+        if np.isnan(rate).any():
+            handles["no flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
+        _limits(axes, maps, panel, handles)
         for level in LEVELS:
-            _boundary(axes, maps, crossings(maps, variant, panel.part, level), seen)
-    _bars(figure, grid, shown_maps, ("survival (–)", "flights (–)"))
-    _legend(figure, seen, _title(maps, panels, title))
+            _boundary(axes, maps, crossings(maps, variant, panel.part, level), handles)
+    _bars(figure, grid, meshes, ("success rate (–)", "flights (–)"))
+    _legend(figure, handles, _title(maps, panels, title))
     return figure
 
 
-def difference_maps(maps: Maps, panels: Sequence[Panel], title: str = "") -> Figure:
-    """Difference of survival on common flights; dots where it is significant."""
+def difference_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Figure:
+    """Difference of success rates on common flights; dots where it is significant."""
     figure, grid = _grid(maps, panels, title, rows=1)
     values = [panel.part.of(maps.pairings[panel.which].difference.estimate) for panel in panels]
     most = max((float(np.nanmax(np.abs(v))) for v in values if not np.isnan(v).all()), default=0.0)
     reach = max(np.ceil(10.0 * most) / 10.0, 0.1)
-    seen: dict[str, Artist] = {}
-    shown_maps: dict[str, QuadMesh] = {}
+    handles: dict[str, Artist] = {}
+    meshes: dict[str, QuadMesh] = {}
     x, y = (places(view) for view in maps.views[:2])
     dotted = False
     for (panel, axes, _), difference in zip(grid, values, strict=True):
         pairing = maps.pairings[panel.which]
-        shown_maps["difference"] = _mesh(axes, maps, difference, DIFFERENCE_COLOURS, (-reach, reach))
+        meshes["difference"] = _mesh(axes, maps, difference, DIFFERENCE_COLOURS, (-reach, reach))
         i, j = np.nonzero(panel.part.of(pairing.significant))
         axes.plot(x[i], y[j], **DOTS)
         dotted |= bool(len(i))
         if np.isnan(difference).any():
-            seen["no common flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
+            handles["no common flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
     level = f"p < {100.0 * (1.0 - maps.study.refine.level):.3g} % after Holm's correction"
     if dotted:
-        seen[f"significant: {level}"] = Line2D([], [], **DOTS)
+        handles[f"significant: {level}"] = Line2D([], [], **DOTS)
     else:
-        seen[f"significant in no cell: {level}"] = Line2D([], [], linestyle="none")
-    _bars(figure, grid, shown_maps, ("difference of survival (–)",))
-    _legend(figure, seen, _title(maps, panels, title))
+        handles[f"significant in no cell: {level}"] = Line2D([], [], linestyle="none")
+    _bars(figure, grid, meshes, ("difference of success rates (–)",))
+    _legend(figure, handles, _title(maps, panels, title))
     return figure
 
 
 def _grid(
-    maps: Maps, panels: Sequence[Panel], title: str, rows: int = 2
-) -> tuple[Figure, list[tuple[Panel, Axes, Axes]]]:
+    maps: Maps, panels: Sequence[MapPanel], title: str, rows: int = 2
+) -> tuple[Figure, list[tuple[MapPanel, Axes, Axes]]]:
     """A figure with empty maps; each panel with its axes, and those below it."""
     across = columns(len(panels))
     down = -(-len(panels) // across)
@@ -113,27 +113,27 @@ def _grid(
     for axes in grid.flat:
         axes.set_visible(False)
     x, y = maps.views[:2]
-    found = []
+    placed = []
     for k, panel in enumerate(panels):
         row, column = divmod(k, across)
-        mine = [grid[rows * row + i, column] for i in range(rows)]
-        for axes in mine:
+        rows_of = [grid[rows * row + i, column] for i in range(rows)]
+        for axes in rows_of:
             axes.set_visible(True)
             axes.grid(visible=False)
             if column == 0:
                 axes.set_ylabel(label(y))
         lowest = k + across >= len(panels)
-        mine[-1].tick_params(labelbottom=lowest)
+        rows_of[-1].tick_params(labelbottom=lowest)
         if lowest:
-            mine[-1].set_xlabel(label(x))
-        mine[0].set_title("\n".join(shown(line, 40 if across <= 2 else 26) for line in panel.title.splitlines()))
-        found.append((panel, mine[0], mine[-1]))
+            rows_of[-1].set_xlabel(label(x))
+        rows_of[0].set_title("\n".join(shown(line, 40 if across <= 2 else 26) for line in panel.title.splitlines()))
+        placed.append((panel, rows_of[0], rows_of[-1]))
     scale_x(grid[0, 0], x, 9 if across <= 2 else 6)
     scale_y(grid[0, 0], y)
-    return figure, found
+    return figure, placed
 
 
-def _title(maps: Maps, panels: Sequence[Panel], title: str) -> str:
+def _title(maps: Maps, panels: Sequence[MapPanel], title: str) -> str:
     """What stands above the legend."""
     count = slices(maps)[1]
     words = [shown(title)] if title else []
@@ -152,7 +152,7 @@ def _mesh(axes: Axes, maps: Maps, values: Array, chosen: Sequence[str], limits: 
 
 
 def _bars(
-    figure: Figure, grid: list[tuple[Panel, Axes, Axes]], meshes: dict[str, QuadMesh], labels: Sequence[str]
+    figure: Figure, grid: list[tuple[MapPanel, Axes, Axes]], meshes: dict[str, QuadMesh], labels: Sequence[str]
 ) -> None:
     """A colour bar beside each row of maps."""
     for i, (mesh, text) in enumerate(zip(meshes.values(), labels, strict=True)):
@@ -167,28 +167,31 @@ def _bars(
             bar.outline.set_linewidth(0.5)
 
 
-def _boundary(axes: Axes, maps: Maps, found: Crossings, seen: dict[str, Artist]) -> None:
-    style = LEVEL_LINES[found.level]
+def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Artist]) -> None:
+    style = LEVEL_LINES[crossed.level]
     x, y = maps.views[:2]
-    for line in found.lines:
-        _line(axes, x.drawn(line[:, 0]), y.drawn(line[:, 1]), style, 3.0)
-    if not len(found.points):
+    for line in crossed.lines:
+        _line(axes, x.coordinates(line[:, 0]), y.coordinates(line[:, 1]), style, 3.0)
+    if not len(crossed.points):
         return
-    at = np.column_stack([x.drawn(found.points[:, 0]), y.drawn(found.points[:, 1])])
+    at = np.column_stack([x.coordinates(crossed.points[:, 0]), y.coordinates(crossed.points[:, 1])])
     for axis, view in enumerate((x, y)):
-        mine = found.along == axis
-        middle = at[mine, axis]
-        ends = [np.where(np.isnan(end), middle, view.drawn(end)) for end in (found.lower[mine], found.upper[mine])]
+        which = crossed.along == axis
+        middle = at[which, axis]
+        ends = [
+            np.where(np.isnan(end), middle, view.coordinates(end))
+            for end in (crossed.lower[which], crossed.upper[which])
+        ]
         bar = np.abs(np.array(ends) - middle)
         axes.errorbar(
-            at[mine, 0], at[mine, 1], xerr=bar if axis == 0 else None, yerr=bar if axis == 1 else None, fmt="none",
+            at[which, 0], at[which, 1], xerr=bar if axis == 0 else None, yerr=bar if axis == 1 else None, fmt="none",
             ecolor=style["color"], elinewidth=0.8, capsize=1.6, capthick=0.8, zorder=3.2,
         )  # fmt: skip
-    if not found.lines:  # crossings of lines that are no neighbours
+    if not crossed.lines:  # crossings of lines that are no neighbours
         style = {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 3.0, "zorder": 3.3}
-        style["markerfacecolor"] = BLACK if found.level == LEVELS[0] else "white"
+        style["markerfacecolor"] = BLACK if crossed.level == LEVELS[0] else "white"
         axes.plot(at[:, 0], at[:, 1], **style)
-    seen[f"{100.0 * found.level:g} % survive, with interval"] = Line2D([], [], **style)
+    handles[f"{100.0 * crossed.level:g} % success, with interval"] = Line2D([], [], **style)
 
 
 def _line(axes: Axes, x: Array, y: Array, style: dict[str, Any], zorder: float) -> None:
@@ -197,26 +200,26 @@ def _line(axes: Axes, x: Array, y: Array, style: dict[str, Any], zorder: float) 
     axes.plot(x, y, zorder=zorder + 0.1, **style)
 
 
-def _limits(axes: Axes, maps: Maps, panel: Panel, seen: dict[str, Artist]) -> None:
-    found = edges(maps, panel.which, panel.part)
-    if found is None:
+def _limits(axes: Axes, maps: Maps, panel: MapPanel, handles: dict[str, Artist]) -> None:
+    edge = edges(maps, panel.which, panel.part)
+    if edge is None:
         return
     x, y = maps.views[:2]
     for text, lines, style in (
-        ("limit of hover, yaw held", found.with_yaw, WITH_YAW),
-        ("limit of hover, yaw given up", found.without_yaw, WITHOUT_YAW),
+        ("limit of hover, yaw held", edge.with_yaw, WITH_YAW),
+        ("limit of hover, yaw given up", edge.without_yaw, WITHOUT_YAW),
     ):
         for line in lines:
-            _line(axes, x.drawn(line[:, 0]), y.drawn(line[:, 1]), style, 2.6)
-            seen[text] = Line2D([], [], **style)
+            _line(axes, x.coordinates(line[:, 0]), y.coordinates(line[:, 1]), style, 2.6)
+            handles[text] = Line2D([], [], **style)
 
 
-def _legend(figure: Figure, seen: dict[str, Artist], title: str) -> None:
-    order = sorted(seen, key=lambda text: not text[0].isdigit())  # the levels first, each above its like
+def _legend(figure: Figure, handles: dict[str, Artist], title: str) -> None:
+    order = sorted(handles, key=lambda text: not text[0].isdigit())  # the levels first, each above its like
     figure.legend(
-        [seen[text] for text in order],
+        [handles[text] for text in order],
         order,
         loc="outside upper center",
-        ncols=-(-len(seen) // 2),
+        ncols=-(-len(handles) // 2),
         title=title or None,
     )

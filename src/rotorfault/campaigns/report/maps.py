@@ -1,10 +1,13 @@
-"""Numbers of a campaign's maps, from its table: survival, grades, recovery, altitude lost, differences, limits.
+"""Numbers of a campaign's maps, from its table: success, grades, recovery, altitude lost, differences, limits.
+
+A flight is a *success* if its grade is one of those that the study names; the *success rate* of a cell is the share
+of its flights that are.
 
 Only whole rounds of a cell count: the flights 0, 1, 2, ... of a cell up to a number at which sampling looks at it.
 So an unfinished campaign has maps too, and every interval holds (`rotorfault.campaigns.sampling.refine`).
 
 Means and shares over several cells give each cell the same weight, however many flights it has: there are most where
-survival is uncertain. Totals over the whole map take the first round's flights of each cell, whose number no result
+success is uncertain. Totals over the whole map take the first round's flights of each cell, whose number no result
 has decided, in the cells that all variants have flown; their intervals put those of the cells together as Zou and
 Donner do (`rotorfault.campaigns.sampling.paired`).
 """
@@ -19,9 +22,11 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
+from rotorfault.campaigns.axes import AXES
+from rotorfault.campaigns.flight_set import Counts
 from rotorfault.campaigns.grades import GRADES
 from rotorfault.campaigns.report.limits import Limits, limits
-from rotorfault.campaigns.sampling.axes import AXES
+from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.sampling.paired import (
     Difference,
     PairCounts,
@@ -29,12 +34,10 @@ from rotorfault.campaigns.sampling.paired import (
     mcnemar_anytime,
     overall_difference,
 )
-from rotorfault.campaigns.sampling.plan import next_round
 from rotorfault.campaigns.sampling.refine import intervals, looks
 from rotorfault.campaigns.sampling.statistics import Array, Interval, holm, wilson
 from rotorfault.campaigns.study import Study
 
-Counts = NDArray[np.int64]
 PROBABILITIES = (0.1, 0.5, 0.9)
 """Of the quantiles: least values within which at least this share of flights stays."""
 MOST_PAIRS = 6
@@ -62,13 +65,13 @@ class View(NamedTuple):
         steps = np.diff(self.positions)
         return self.numeric and (len(steps) == 0 or float(steps.max()) <= MOST_UNEVEN * float(steps.min()))
 
-    def drawn(self, values: Array) -> Array:
+    def coordinates(self, values: Array) -> Array:
         """Where values are drawn: to scale, or as many cells on where a scale would hide the narrow ones."""
         places = np.arange(float(len(self.values)))
         return values if self.even or not self.numeric else np.interp(values, self.positions, places)
 
-    def said(self, place: int) -> str:
-        """One of the values as text."""
+    def text(self, place: int) -> str:
+        """One of the values."""
         value = self.values[place]
         return f"{value:g}" if isinstance(value, float) else str(value)
 
@@ -84,16 +87,16 @@ class VariantMap(NamedTuple):
     label: str
     cell: Counts  # number of the cell in the study
     flights: Counts
-    survived: Counts
-    survival: Array  # NaN in cells without flights
-    lower: Array
+    successes: Counts
+    success_rate: Array  # NaN in cells without flights
+    lower: Array  # with `upper`, the interval of the success rate
     upper: Array
     grades: Counts  # (grades, ...)
-    recovery: Array  # s, (probabilities, ...); infinite where more do not recover, NaN where nothing failed
-    altitude: Array  # m, (probabilities, ...); infinite where more are lost, NaN where nothing failed
-    first_lost: Counts  # id of the first flight that was lost; -1 where none was
+    recovery: Array  # s, (probabilities, ...); infinite where more do not recover, NaN where no rotor failed
+    altitude: Array  # m, (probabilities, ...); infinite where more are no success, NaN where no rotor failed
+    first_failure: Counts  # id of the first flight that was no success; -1 where all were
     possible: Limits | None  # whether hover is physically possible
-    total: Difference  # survival over the whole map; of the first round
+    total: Difference  # success rate over the whole map; of the first round
     shares: Array  # grades along the first axis, (grades, first); NaN where nothing was flown
     recovery_along: Array  # s, (probabilities, first)
     altitude_along: Array  # m, (probabilities, first)
@@ -108,7 +111,7 @@ class Pairing(NamedTuple):
     difference: Difference  # holds however the number of pairs came about
     p_value: Array  # corrected for the number of cells; NaN in cells without pairs
     significant: NDArray[np.bool_]
-    first_apart: Counts  # number of the first flight that only one of them survived; -1 where there is none
+    first_apart: Counts  # number of the first flight in which only one was successful; -1 where there is none
     total: Difference  # over the whole map; of the first round
 
 
@@ -125,7 +128,7 @@ class Maps(NamedTuple):
     complete: bool  # whether sampling asks for no further flight
 
 
-class _Flown(NamedTuple):
+class _Sample(NamedTuple):
     """The flights of one variant that count, sorted by cell and number."""
 
     place: Counts  # of the cell in the map as the views order it
@@ -148,26 +151,26 @@ def maps(study: Study, table: pa.Table) -> Maps:
         If no cell has a whole round yet.
     """
     views = tuple(_view(part.name, part.grid) for part in study.axis)
-    names = ("variant", "cell", "number", "id", "survived", "grade", "recovery_time", "altitude_lost")
+    names = ("variant", "cell", "number", "id", "success", "grade", "recovery_time", "altitude_lost")
     columns = {name: table[name].to_numpy(zero_copy_only=False) for name in names}
     cell = np.arange(study.cells).reshape(study.shape)[np.ix_(*(view.order for view in views))]
     place_of = np.empty(study.cells, dtype=np.int64)
     place_of[cell.ravel()] = np.arange(study.cells)
-    flown = [_flown(study, columns, variant.label, place_of) for variant in study.variant]
-    flights = sum(len(each.place) for each in flown)
+    samples = [_sample(study, columns, variant.label, place_of) for variant in study.variant]
+    flights = sum(len(sample.place) for sample in samples)
     if not flights:
         raise InputError(f"{study.name}: no cell has a whole round of flights yet; go on with --resume")
     # Totals of variants over different cells could not be compared.
-    common = np.all([np.bincount(each.place, minlength=study.cells) > 0 for each in flown], axis=0)
-    variants = tuple(_variant(study, k, each, cell, common) for k, each in enumerate(flown))
-    pairs = list(itertools.combinations(range(len(flown)), 2))
+    common = np.all([np.bincount(sample.place, minlength=study.cells) > 0 for sample in samples], axis=0)
+    variants = tuple(_variant(study, k, sample, cell, common) for k, sample in enumerate(samples))
+    pairs = list(itertools.combinations(range(len(samples)), 2))
     if len(pairs) > MOST_PAIRS:
-        pairs = [(0, k) for k in range(1, len(flown))]
+        pairs = [(0, k) for k in range(1, len(samples))]
     return Maps(
         study=study,
         views=views,
         variants=variants,
-        pairings=tuple(_pairing(study, a, b, flown, common) for a, b in pairs),
+        pairings=tuple(_pairing(study, a, b, samples, common) for a, b in pairs),
         flights=flights,
         left_out=table.num_rows - flights,
         compared=int(common.sum()),
@@ -181,79 +184,78 @@ def _view(name: str, grid: list[float | str]) -> View:
     return View(name, AXES[name].unit if name in AXES else "", [grid[i] for i in order], order, numeric)
 
 
-def _flown(study: Study, columns: dict[str, NDArray[Any]], label: str, place_of: Counts) -> _Flown:
-    mine = np.flatnonzero(columns["variant"] == label)
-    mine = mine[np.lexsort((columns["number"][mine], columns["cell"][mine]))]
-    cell, number = columns["cell"][mine], columns["number"][mine]
+def _sample(study: Study, columns: dict[str, NDArray[Any]], label: str, place_of: Counts) -> _Sample:
+    rows = np.flatnonzero(columns["variant"] == label)
+    rows = rows[np.lexsort((columns["number"][rows], columns["cell"][rows]))]
+    cell, number = columns["cell"][rows], columns["number"][rows]
     start = np.searchsorted(cell, cell, side="left")
     in_a_row = number == np.arange(len(cell)) - start  # numbers differ, so beyond a gap none is its rank
     length = np.bincount(cell[in_a_row], minlength=study.cells)
-    steps = np.array([0, *looks(study.refine.refinement())])
+    steps = np.array([0, *looks(study.refine)])
     whole = steps[np.searchsorted(steps, length, side="right") - 1]
     keep = in_a_row & (number < whole[cell])
-    mine = mine[keep]
-    return _Flown(place_of[cell[keep]], number[keep], {name: each[mine] for name, each in columns.items()})
+    rows = rows[keep]
+    return _Sample(place_of[cell[keep]], number[keep], {name: column[rows] for name, column in columns.items()})
 
 
 def _complete(study: Study, variants: tuple[VariantMap, ...]) -> bool:
     counts = np.zeros((2, len(variants), study.cells), dtype=np.int64)
     for k, variant in enumerate(variants):
-        counts[:, k, variant.cell.ravel()] = variant.survived.ravel(), variant.flights.ravel()
+        counts[:, k, variant.cell.ravel()] = variant.successes.ravel(), variant.flights.ravel()
     return not next_round(study, counts[0], counts[1]).size
 
 
-def _variant(study: Study, k: int, flown: _Flown, cell: Counts, common: NDArray[np.bool_]) -> VariantMap:
-    shape, count = cell.shape, cell.size
-    survived = flown.columns["survived"].astype(bool)
-    trials, successes = np.bincount(flown.place, minlength=count), np.bincount(flown.place[survived], minlength=count)
-    bounds = intervals(successes, trials, study.refine.refinement())
+def _variant(study: Study, k: int, sample: _Sample, cell: Counts, common: NDArray[np.bool_]) -> VariantMap:
+    shape, count, place = cell.shape, cell.size, sample.place
+    success = sample.columns["success"].astype(bool)
+    trials, successes = np.bincount(place, minlength=count), np.bincount(place[success], minlength=count)
+    bounds = intervals(successes, trials, study.refine)
     with np.errstate(invalid="ignore"):
-        survival = np.where(trials > 0, successes / np.maximum(trials, 1), np.nan)
-    grade = {name: i for i, name in enumerate(GRADES)}
-    graded = np.array([grade[name] for name in flown.columns["grade"]], dtype=np.int64)
-    by_grade = np.bincount(graded * count + flown.place, minlength=len(GRADES) * count).reshape(len(GRADES), count)
-    lost = np.full(count, -1)
-    lost_places, first = np.unique(flown.place[~survived], return_index=True)  # sorted by number within a cell
-    lost[lost_places] = flown.columns["id"][~survived][first]
-    recovery, altitude = _costs(flown, survived)
-    alike, weight = np.ones(len(flown.place)), 1.0 / np.maximum(trials, 1)[flown.place]
-    along, rows = flown.place // (count // shape[0]), shape[0]
+        success_rate = np.where(trials > 0, successes / np.maximum(trials, 1), np.nan)
+    index_of = {name: i for i, name in enumerate(GRADES)}
+    grade = np.array([index_of[name] for name in sample.columns["grade"]], dtype=np.int64)
+    by_grade = np.bincount(grade * count + place, minlength=len(GRADES) * count).reshape(len(GRADES), count)
+    failure = np.full(count, -1)
+    places, first = np.unique(place[~success], return_index=True)  # sorted by number within a cell
+    failure[places] = sample.columns["id"][~success][first]
+    recovery, altitude = _costs(sample, success)
+    alike, weight = np.ones(len(place)), 1.0 / np.maximum(trials, 1)[place]
+    along, rows = place // (count // shape[0]), shape[0]
     quantiles = [
         weighted_quantiles(values, weights, groups, n).reshape(-1, *form)
         for values in (recovery, altitude)
-        for weights, groups, n, form in ((alike, flown.place, count, shape), (weight, along, rows, (rows,)))
+        for weights, groups, n, form in ((alike, place, count, shape), (weight, along, rows, (rows,)))
     ]
-    values = study.cell_values(cell.ravel())
-    found = limits(study, k, values)
+    possible = limits(study, k, study.cell_values(cell.ravel()))
     return VariantMap(
         label=study.variant[k].label,
         cell=cell,
         flights=trials.reshape(shape),
-        survived=successes.reshape(shape),
-        survival=survival.reshape(shape),
+        successes=successes.reshape(shape),
+        success_rate=success_rate.reshape(shape),
         lower=bounds.lower.reshape(shape),
         upper=bounds.upper.reshape(shape),
         grades=by_grade.reshape(-1, *shape),
         recovery=quantiles[0],
         altitude=quantiles[2],
-        first_lost=lost.reshape(shape),
-        possible=None if found is None else Limits(*(each.reshape(shape) for each in found)),
-        total=_total(study, flown, survived, common),
+        first_failure=failure.reshape(shape),
+        possible=None if possible is None else Limits(*(each.reshape(shape) for each in possible)),
+        total=_total(study, sample, success, common),
         shares=_shares(by_grade.reshape(len(GRADES), rows, -1)),
         recovery_along=quantiles[1],
         altitude_along=quantiles[3],
     )
 
 
-def _costs(flown: _Flown, survived: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Recovery time and altitude lost of each flight, infinite where it never recovered, or was lost.
+def _costs(sample: _Sample, success: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Recovery time and altitude lost of each flight, infinite where it never recovered, or was no success.
 
     Left out, such flights would make a variant look the better the more of them it has; and one that tumbles is
     over before it has fallen far. NaN is kept for flights without a loss.
     """
-    recovery, altitude = (flown.columns[name].astype(float) for name in ("recovery_time", "altitude_lost"))
-    failed = ~np.isnan(altitude)  # has a number from the first loss on
-    return np.where(np.isnan(recovery) & failed, np.inf, recovery), np.where(survived | ~failed, altitude, np.inf)
+    recovery, altitude = (sample.columns[name].astype(float) for name in ("recovery_time", "altitude_lost"))
+    faulty = ~np.isnan(altitude)  # has a number from the first loss of thrust on
+    return np.where(np.isnan(recovery) & faulty, np.inf, recovery), np.where(success | ~faulty, altitude, np.inf)
 
 
 def _shares(by_grade: Counts) -> Array:
@@ -280,27 +282,27 @@ def weighted_quantiles(values: Array, weights: Array, groups: Counts, count: int
     ndarray, shape (probabilities, count)
         NaN in groups without values.
     """
-    known = ~np.isnan(values)
-    values, weights, groups = values[known], weights[known], groups[known]
+    numbers = ~np.isnan(values)
+    values, weights, groups = values[numbers], weights[numbers], groups[numbers]
     order = np.lexsort((values, groups))
     values, weights, groups = values[order], weights[order], groups[order]
     sums = np.concatenate([[0.0], np.cumsum(weights)])
     ends = np.searchsorted(groups, np.arange(count + 1))
     start, total = sums[ends[:-1]], np.diff(sums[ends])
-    found = np.full((len(PROBABILITIES), count), np.nan)
+    quantiles = np.full((len(PROBABILITIES), count), np.nan)
     some = total > 0.0
     for k, probability in enumerate(PROBABILITIES):
         # Less a bit, so that rounding of sums does not ask for the next value.
         place = np.searchsorted(sums[1:], start + (probability - 1e-9) * total)
-        found[k, some] = values[np.clip(place, ends[:-1], ends[1:] - 1)[some]]
-    return found
+        quantiles[k, some] = values[np.clip(place, ends[:-1], ends[1:] - 1)[some]]
+    return quantiles
 
 
-def _total(study: Study, flown: _Flown, survived: NDArray[np.bool_], common: NDArray[np.bool_]) -> Difference:
-    """Survival over the cells that all variants have flown, on the first round's flights."""
-    first = (flown.number < study.refine.initial) & common[flown.place]
-    trials = np.bincount(flown.place[first], minlength=study.cells)
-    successes = np.bincount(flown.place[first & survived], minlength=study.cells)
+def _total(study: Study, sample: _Sample, success: NDArray[np.bool_], common: NDArray[np.bool_]) -> Difference:
+    """Success rate over the cells that all variants have flown, on the first round's flights."""
+    first = (sample.number < study.refine.initial) & common[sample.place]
+    trials = np.bincount(sample.place[first], minlength=study.cells)
+    successes = np.bincount(sample.place[first & success], minlength=study.cells)
     some = trials > 0
     if not some.any():
         return Difference(*(np.asarray(np.nan) for _ in range(3)))
@@ -316,14 +318,14 @@ def _together(estimate: Array, bounds: Interval) -> Difference:
     return Difference(middle, middle - down, middle + up)
 
 
-def _pairing(study: Study, first: int, second: int, flown: list[_Flown], common: NDArray[np.bool_]) -> Pairing:
-    a, b = flown[first], flown[second]
+def _pairing(study: Study, first: int, second: int, samples: list[_Sample], common: NDArray[np.bool_]) -> Pairing:
+    a, b = samples[first], samples[second]
     keys = [each.place * study.refine.most + each.number for each in (a, b)]
     _, at_a, at_b = np.intersect1d(keys[0], keys[1], assume_unique=True, return_indices=True)
     place, number = a.place[at_a], a.number[at_a]
-    by_a, by_b = (each.columns["survived"].astype(bool)[at] for each, at in ((a, at_a), (b, at_b)))
+    by_a, by_b = (each.columns["success"].astype(bool)[at] for each, at in ((a, at_a), (b, at_b)))
 
-    def counted(which: NDArray[np.bool_]) -> PairCounts:
+    def counts(which: NDArray[np.bool_]) -> PairCounts:
         return PairCounts(
             *(
                 np.bincount(place[which & kind], minlength=study.cells)
@@ -332,10 +334,8 @@ def _pairing(study: Study, first: int, second: int, flown: list[_Flown], common:
         )
 
     shape = tuple(study.shape)
-    everything, early = (
-        counted(np.ones(len(place), dtype=bool)),
-        counted((number < study.refine.initial) & common[place]),
-    )
+    everything = counts(np.ones(len(place), dtype=bool))
+    early = counts((number < study.refine.initial) & common[place])
     difference = difference_anytime(*everything, study.refine.level)
     p_value = holm(np.where(everything.pairs > 0, mcnemar_anytime(*everything[:2]), np.nan))
     with np.errstate(invalid="ignore"):

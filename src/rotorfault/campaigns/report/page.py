@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from rotorfault.campaigns import grades
-from rotorfault.campaigns.block import RECOVERED
 from rotorfault.campaigns.report import charts
 from rotorfault.campaigns.report.charts import signed
 from rotorfault.campaigns.report.curves import slices
@@ -27,15 +26,16 @@ from rotorfault.campaigns.sampling.statistics import Array
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 MEANINGS = {
-    "tracked": f"flew to its end; over the last half within {grades.TRACKED:g} m (root mean square) and "
+    "held": f"flew to its end; over the last half within {grades.HELD:g} m (root mean square) and "
     f"{grades.YAW:g} rad of yaw",
     "yaw given up": f"the same in position (up to {grades.BOUNDED:g} m), but yaw was off by more",
-    "degraded": f"flew to its end with a bounded offset, {grades.TRACKED:g} m to {grades.BOUNDED:g} m",
+    "degraded": f"flew to its end with a bounded offset, {grades.HELD:g} m to {grades.BOUNDED:g} m",
     "controlled descent": f"came down upright (within {np.degrees(grades.UPRIGHT):.0f} degrees) at no more than "
     f"{grades.DESCENT:g} m/s, or landed",
-    "ground": "hit the ground faster than that, or tilted",
-    "tumbled": "tilted beyond 90 degrees in the air",
-    "diverged": f"a state is not finite or 10 km away, or the vehicle flew on more than {grades.BOUNDED:g} m off",
+    "drifted": f"flew to its end, but more than {grades.BOUNDED:g} m off",
+    "crashed": f"hit the ground faster than {grades.DESCENT:g} m/s, or tilted by more than "
+    f"{np.degrees(grades.UPRIGHT):.0f} degrees",
+    "lost": "tumbled, tilted beyond 90 degrees in the air, or diverged: a state is not finite or 10 km away",
 }
 
 
@@ -46,19 +46,19 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
     ----------
     maps : Maps
     folder : Path
-        Of the campaign, as commands shall name it.
+        Of the campaign, as commands are to name it.
     versions : mapping of str to str
         With which the campaign was flown.
     figures : mapping of str to Path
-        SVG files to be shown: ``outcomes`` and ``recovery``.
+        SVG files to be shown: ``grades`` and ``recovery``.
     """
     template = (resources.files("rotorfault.campaigns.report") / "campaign.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     cells = [charts.variant_cells(maps, k, folder) for k in range(len(maps.variants))]
     sections = _sections(maps, folder, cells)
     rows = [
-        {"variant": variant.label, "cell": int(variant.cell[at]), "said": mine[at]}
-        for variant, mine in zip(maps.variants, cells, strict=True)
+        {"variant": variant.label, "cell": int(variant.cell[at]), "note": notes[at]}
+        for variant, notes in zip(maps.variants, cells, strict=True)
         for at in np.ndindex(*variant.cell.shape)
     ]
     return environment.from_string(template).render(
@@ -67,7 +67,7 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         seeds=f"{maps.study.seed}; a flight's draws and seed follow from it, its cell and its number within the cell",
         versions=versions,
         meanings=MEANINGS,
-        recovered=f"{RECOVERED:g}",
+        recovered=f"{grades.RECOVERED:g}",
         axes=[_axis(maps, k) for k in range(len(maps.views))],
         totals=[_total(maps, k) for k in range(len(maps.variants))],
         differences=[
@@ -92,22 +92,22 @@ def _sections(maps: Maps, folder: Path, cells: list[NDArray[np.object_]]) -> lis
     """The interactive charts, with a title each."""
     one = len(maps.views) == 1
     parts = [] if one else slices(maps)[0]
-    found: list[dict[str, Any]] = []
+    sections: list[dict[str, Any]] = []
     for k, variant in enumerate(maps.variants):
         if one:
-            found.append(_section("survival", variant.label, "", charts.survival_lines_chart(maps, k, cells[k])))
-        found += [
-            _section("survival", variant.label, part.title, charts.survival_chart(maps, k, part, cells[k]))
+            sections.append(_section("success", variant.label, "", charts.success_lines_chart(maps, k, cells[k])))
+        sections += [
+            _section("success", variant.label, part.title, charts.success_chart(maps, k, part, cells[k]))
             for part in parts
         ]
     for k, pair in enumerate(maps.pairings):
-        mine, title = charts.pairing_cells(maps, k, folder), f"{pair.first} less {pair.second}"
+        notes, title = charts.pairing_cells(maps, k, folder), f"{pair.first} less {pair.second}"
         if one:
-            found.append(_section("difference", title, "", charts.difference_lines_chart(maps, k, mine)))
-        found += [
-            _section("difference", title, part.title, charts.difference_chart(maps, k, part, mine)) for part in parts
+            sections.append(_section("difference", title, "", charts.difference_lines_chart(maps, k, notes)))
+        sections += [
+            _section("difference", title, part.title, charts.difference_chart(maps, k, part, notes)) for part in parts
         ]
-    return found
+    return sections
 
 
 def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, Any]:
@@ -116,8 +116,8 @@ def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, A
 
 def _axis(maps: Maps, k: int) -> str:
     view = maps.views[k]
-    ends = f"{view.said(0)} to {view.said(len(view.values) - 1)}" if view.numeric else ", ".join(
-        view.said(i) for i in range(len(view.values))
+    ends = f"{view.text(0)} to {view.text(len(view.values) - 1)}" if view.numeric else ", ".join(
+        view.text(i) for i in range(len(view.values))
     )  # fmt: skip
     unit = f" {view.unit}" if view.unit not in ("", "1") else ""
     return f"{view.title}: {ends}{unit}, {len(view.values)} values"
@@ -132,7 +132,7 @@ def _total(maps: Maps, k: int) -> dict[str, Any]:
         "variant": variant.label,
         "flights": int(variant.flights.sum()),
         "cells": int((variant.flights > 0).sum()),
-        "survival": _interval(variant.total, lambda share: f"{100.0 * share:.1f} %"),
+        "success": _interval(variant.total, lambda share: f"{100.0 * share:.1f} %"),
         "held": held,
         "free": free,
     }
@@ -144,8 +144,8 @@ def _cells(possible: Array) -> str:
     return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")
 
 
-def _interval(found: Difference, text: Callable[[float], str]) -> str:
-    estimate, lower, upper = (float(each) for each in found)
+def _interval(difference: Difference, text: Callable[[float], str]) -> str:
+    estimate, lower, upper = (float(each) for each in difference)
     if np.isnan(estimate):
         return "–"
     return f"{text(estimate)} ({text(max(lower, -1.0))} to {text(min(upper, 1.0))})"

@@ -18,7 +18,7 @@ FIGURES, PAGE = "figures", "report.html"
 
 
 def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, str]) -> list[Path]:
-    """Make pictures and page of a campaign from its table.
+    """Draw the figures of a campaign and write its page, from its table.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, st
     InputError
         If no cell has a whole round yet, or the folder cannot be written.
     """
-    found = maps(study, table)
-    figures = save(draw(found), folder / FIGURES, ("png", "svg"))
-    shown = {path.stem: path for path in figures if path.suffix == ".svg" and path.stem in ("outcomes", "recovery")}
-    text, page = render(found, folder, versions, shown), folder / PAGE
+    numbers = maps(study, table)
+    figures = save(draw(numbers), folder / FIGURES, ("png", "svg"))
+    shown = {path.stem: path for path in figures if path.suffix == ".svg" and path.stem in ("grades", "recovery")}
+    text, page = render(numbers, folder, versions, shown), folder / PAGE
     write_atomically(page, lambda temporary: temporary.write_text(text, encoding="utf-8"))
     return [page, *figures]

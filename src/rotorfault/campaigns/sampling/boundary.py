@@ -1,13 +1,13 @@
-"""Where on a map survival crosses a level: curves with intervals, from counts on a grid.
+"""Where on a map the success rate crosses a level: curves with intervals, from counts on a grid.
 
-Along each line of the grid, survival is taken as straight between the estimates (survivals over flights) of
+Along each line of the grid, the success rate is taken as straight between the estimates (successes over flights) of
 neighbouring cells. Estimates drawn towards one half, such as Wilson's centres, would shift a boundary of 99 % by
-whole cells: of 24 survivals in 24 flights they make 93 %.
+whole cells: of 24 successes in 24 flights they make 93 %.
 
 The interval of a crossing reaches from it to where the line's lower bounds rise above the level, or its upper bounds
 fall below it. It holds as each cell's interval does, crossing by crossing, not for the whole curve at once.
 
-Survival need not be monotone, so there may be several crossings. Where it is known to be, estimates and bounds can be
+Success need not be monotone, so there may be several crossings. Where it is known to be, estimates and bounds can be
 made so by the nearest monotone values in the sense of least squares, weighted with flights (M. Ayer et al., Ann.
 Math. Stat. 26 (1955) 641-647). If a monotone curve lies between the bounds all along a line, it lies between those
 made monotone as well (V. Chernozhukov, I. Fernández-Val and A. Galichon, Biometrika 96 (2009) 559-575).
@@ -37,7 +37,7 @@ class Boundary(NamedTuple):
     lower, upper : ndarray, shape (lines, crossings)
         Between which the crossing lies; NaN if that is as far as the map or a gap in it.
     direction : ndarray, shape (lines, crossings)
-        1 where survival rises across the level, -1 where it falls.
+        1 where the success rate rises across the level, -1 where it falls.
     """
 
     position: Array
@@ -56,7 +56,7 @@ def boundary(
     interval: Interval | None = None,
     monotone: str | None = None,
 ) -> Boundary:
-    """Where survival crosses a level along the lines of a grid.
+    """Where the success rate crosses a level along the lines of a grid.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def boundary(
     positions : array_like, shape (rows,) or (columns,)
         Of the cells along the axis, ascending.
     level : float
-        Survival, in (0, 1).
+        Success rate, in (0, 1).
     axis : {-1, 0, 1}, optional
         Along which to look: 1 or -1 gives the crossings in each row, 0 those in each column.
     interval : Interval, optional
-        Of each cell, such as `rotorfault.campaigns.sampling.refine.intervals` has it; that of Clopper and Pearson with 95 % if
-        not given, which is for numbers of flights that were fixed beforehand.
+        Of each cell, such as `rotorfault.campaigns.sampling.refine.intervals` has it; that of Clopper and Pearson
+        with 95 % if not given, which is for numbers of flights that were fixed beforehand.
     monotone : {"rising", "falling"}, optional
-        What survival is known to do along the axis.
+        What the success rate is known to do along the axis.
 
     Returns
     -------
@@ -99,9 +99,9 @@ def boundary(
     s, n, low, high = (np.moveaxis(np.asarray(each, dtype=float), axis, -1) for each in (s, n, *bounds))
     if x.shape != s.shape[1:] or not (np.diff(x) > 0.0).all():
         raise InputError(f"positions: got shape {x.shape}; allowed: {s.shape[1:]}, ascending")
-    found = [_line(x, s[i], n[i], low[i], high[i], level, monotone) for i in range(len(s))]
-    table = np.full((4, len(s), max(map(len, found), default=0)), np.nan)
-    for i, crossings in enumerate(found):
+    lines = [_line(x, s[i], n[i], low[i], high[i], level, monotone) for i in range(len(s))]
+    table = np.full((4, len(s), max(map(len, lines), default=0)), np.nan)
+    for i, crossings in enumerate(lines):
         table[:, i, : len(crossings)] = np.reshape(crossings, (-1, 4)).T
     return Boundary(*table)
 
@@ -110,9 +110,9 @@ def _line(
     x: Array, s: Array, n: Array, low: Array, high: Array, level: float, monotone: str | None
 ) -> list[tuple[float, float, float, float]]:
     """Position, interval and direction of each crossing."""
-    found = []
-    known = np.flatnonzero(n > 0.0)
-    for run in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+    crossings = []
+    flown = np.flatnonzero(n > 0.0)
+    for run in np.split(flown, np.flatnonzero(np.diff(flown) > 1) + 1):
         if len(run) < 2:
             continue
         curves = [s[run] / n[run], low[run], high[run]]
@@ -125,10 +125,10 @@ def _line(
         exits = np.array([position for end in ends for position, _ in end])
         for position, direction in middle:
             left, right = exits[exits <= position], exits[exits >= position]
-            found.append((position, left.max(initial=-np.inf), right.min(initial=np.inf), direction))
+            crossings.append((position, left.max(initial=-np.inf), right.min(initial=np.inf), direction))
     return [
         (p, lower if np.isfinite(lower) else np.nan, upper if np.isfinite(upper) else np.nan, d)
-        for p, lower, upper, d in found
+        for p, lower, upper, d in crossings
     ]
 
 

@@ -1,10 +1,9 @@
 r"""Two controllers that flew the same seeds, compared pair by pair.
 
-Of the pairs of flights, one by each controller with the same seed, :math:`b` are those that only the first survived
-and :math:`c` those that only the second did.
+Of the pairs of flights, one by each controller with the same seed, :math:`b` are those in which only the first was
+successful and :math:`c` those in which only the second was.
 
 ====================  ================================================================================================
-mcnemar               Q. McNemar, Psychometrika 12 (1947) 153-157; exact, by the binomial distribution
 paired_difference     T. Tango, Stat. Med. 17 (1998) 891-908: the score interval
 overall_difference    G. Y. Zou and A. Donner, Stat. Med. 27 (2008) 1693-1702: variances recovered from intervals
 mcnemar_anytime,      H. Robbins, Ann. Math. Stat. 41 (1970) 1397-1409: likelihood ratio against a mixture, with the
@@ -16,8 +15,8 @@ controller's flights in a cell by their results, so the number of seeds that bot
 the ``anytime`` functions there, or on the first block of every cell, whose size is fixed.
 
 Pairs must be independent. Cells that share their seeds have pairs that are not: there, compare cell by cell and
-correct with `rotorfault.campaigns.sampling.statistics.holm`; sums over cells and `overall_difference` need seeds of its own in
-each cell.
+correct with `rotorfault.campaigns.sampling.statistics.holm`; sums over cells and `overall_difference` need seeds of
+its own in each cell.
 """
 
 from __future__ import annotations
@@ -27,13 +26,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import bdtr, betaln, gammaln, ndtri, stdtrit, xlogy
+from scipy.special import betaln, gammaln, ndtri, xlogy
 
-from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.errors import InputError
 from rotorfault.campaigns.sampling.statistics import Array, check_level
 
 HALVINGS = 60  # of an interval of length 2: to rounding
-RESAMPLED_AT_ONCE = 1_000_000  # numbers that the bootstrap draws together: 8 MB
 
 
 class Difference(NamedTuple):
@@ -52,39 +50,24 @@ class PairCounts(NamedTuple):
     pairs: NDArray[np.int64]
 
 
-def pair_counts(first: ArrayLike, second: ArrayLike) -> PairCounts:
-    """Count pairs by what came of them.
+def mcnemar_anytime(only_first: ArrayLike, only_second: ArrayLike) -> Array:
+    """P-value of equal success rates that holds however the number of pairs came about.
 
-    Parameters
-    ----------
-    first, second : array_like, shape (..., N)
-        Whether each flight was survived, seed by seed. NaN where it was not flown: the pair does not count.
-    """
-    a, b = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
-    both = ~(np.isnan(a) | np.isnan(b))
-    only_first = (both & (a > b)).sum(axis=-1)
-    only_second = (both & (a < b)).sum(axis=-1)
-    return PairCounts(np.asarray(only_first), np.asarray(only_second), np.asarray(both.sum(axis=-1)))
-
-
-def mcnemar(only_first: ArrayLike, only_second: ArrayLike) -> Array:
-    """Exact two-sided p-value of equal survival.
-
-    Pairs with one result count, each as likely either way if the controllers are equal. For all cells together give
-    the sums over cells: in each of them pairs are then as likely either way.
+    Pairs in which one of the two was successful count, each as likely either way if the controllers are equal.
 
     Parameters
     ----------
     only_first, only_second : array_like of int
-        Pairs that only one of the controllers survived.
+        Pairs in which only one of the controllers was successful.
+
+    Raises
+    ------
+    InputError
+        If a count is negative.
     """
-    b, c = _discordant(only_first, only_second)
-    return np.asarray(np.minimum(2.0 * bdtr(np.minimum(b, c), (b + c).astype(np.int64), 0.5), 1.0))
-
-
-def mcnemar_anytime(only_first: ArrayLike, only_second: ArrayLike) -> Array:
-    """P-value of equal survival that holds however the number of pairs came about. Arguments as of `mcnemar`."""
-    b, c = _discordant(only_first, only_second)
+    b, c = np.broadcast_arrays(np.asarray(only_first, dtype=float), np.asarray(only_second, dtype=float))
+    if not ((b >= 0) & (c >= 0)).all():
+        raise InputError("pairs in which only one was successful: fewer than 0")
     evidence = betaln(b + 0.5, c + 0.5) - betaln(0.5, 0.5) + (b + c) * np.log(2.0)
     return np.asarray(np.exp(-np.maximum(evidence, 0.0)))
 
@@ -92,7 +75,7 @@ def mcnemar_anytime(only_first: ArrayLike, only_second: ArrayLike) -> Array:
 def paired_difference(
     only_first: ArrayLike, only_second: ArrayLike, pairs: ArrayLike, level: float = 0.95
 ) -> Difference:
-    """Difference of survival with Tango's score interval.
+    """Difference of success rates with Tango's score interval.
 
     Parameters
     ----------
@@ -119,7 +102,7 @@ def paired_difference(
 def difference_anytime(
     only_first: ArrayLike, only_second: ArrayLike, pairs: ArrayLike, level: float = 0.95
 ) -> Difference:
-    """Difference of survival with an interval that holds however the number of pairs came about.
+    """Difference of success rates with an interval that holds however the number of pairs came about.
 
     Parameters
     ----------
@@ -150,7 +133,7 @@ def overall_difference(
     level: float = 0.95,
     weights: ArrayLike | None = None,
 ) -> Difference:
-    """Difference of survival over all cells, with an approximate interval.
+    """Difference of success rates over all cells, with an approximate interval.
 
     Parameters
     ----------
@@ -160,7 +143,7 @@ def overall_difference(
         In (0, 1).
     weights : array_like, optional
         Of the cells, at least 0; equal if not given. Sums over cells would weigh each by its number of flights, which
-        is highest where survival is most uncertain.
+        is highest where success is most uncertain.
 
     Raises
     ------
@@ -178,57 +161,8 @@ def overall_difference(
     return Difference(middle, middle - down, middle + up)
 
 
-def mean_difference(
-    first: ArrayLike, second: ArrayLike, method: str = "t", level: float = 0.95, seed: int = 0, resamples: int = 9999
-) -> Difference:
-    """Mean difference of a number, pair by pair.
-
-    Parameters
-    ----------
-    first, second : array_like, shape (N,)
-        Seed by seed. A pair with NaN is left out: of a cost that only survivors have, this is the difference on
-        flights that both survived, not on all.
-    method : {"t", "bootstrap"}
-        Student's interval, or percentiles of means of resampled pairs.
-    level : float, optional
-        In (0, 1).
-    seed, resamples : int, optional
-        For the bootstrap.
-
-    Returns
-    -------
-    Difference
-        Scalars. NaN of no pairs; bounds NaN of one.
-
-    Raises
-    ------
-    InputError
-        If there is no such method, or the level is out of range.
-    """
-    check_level(level)
-    if method not in ("t", "bootstrap"):
-        raise InputError(unknown("interval", method, ["t", "bootstrap"]))
-    difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
-    difference = difference[~np.isnan(difference)]
-    n = len(difference)
-    nothing = np.asarray(np.nan)
-    if n < 2:
-        return Difference(difference.mean() if n else nothing, nothing, nothing)
-    mean = difference.mean()
-    if method == "t":
-        half = stdtrit(n - 1, 0.5 + level / 2.0) * difference.std(ddof=1) / np.sqrt(n)
-        return Difference(mean, mean - half, mean + half)
-    rng, at_once = np.random.default_rng(seed), max(RESAMPLED_AT_ONCE // n, 1)
-    means = [
-        difference[rng.integers(n, size=(min(at_once, resamples - done), n))].mean(axis=1)
-        for done in range(0, resamples, at_once)
-    ]
-    lower, upper = np.quantile(np.concatenate(means), [0.5 - level / 2.0, 0.5 + level / 2.0])
-    return Difference(mean, lower, upper)
-
-
 def _second_alone(b: Array, c: Array, n: Array, d: Array) -> Array:
-    """Likeliest probability that only the second survives, if the difference is d: Tango's equation for q21."""
+    """Likeliest probability that only the second is successful, if the difference is d: Tango's equation for q21."""
     linear = -b - c + (2.0 * n - b + c) * d
     root = np.sqrt(np.maximum(linear**2 + 8.0 * n * c * d * (1.0 - d), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -251,16 +185,9 @@ def _searched(b: Array, c: Array, n: Array, holds: Callable[[Array], NDArray[np.
     return Difference(estimate, bounds[0], bounds[1])
 
 
-def _discordant(only_first: ArrayLike, only_second: ArrayLike) -> tuple[Array, Array]:
-    b, c = np.broadcast_arrays(np.asarray(only_first, dtype=float), np.asarray(only_second, dtype=float))
-    if not ((b >= 0) & (c >= 0)).all():
-        raise InputError("pairs that only one survived: fewer than 0")
-    return b, c
-
-
 def _pairs(b: ArrayLike, c: ArrayLike, n: ArrayLike, level: float) -> tuple[Array, Array, Array]:
     check_level(level)
     first, second, pairs = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (b, c, n)))
     if not ((first >= 0) & (second >= 0) & (first + second <= pairs)).all():
-        raise InputError("pairs: some count is negative, or more pairs had one survivor than there are")
+        raise InputError("pairs: some count is negative, or more pairs had one success than there are")
     return first, second, pairs

@@ -1,91 +1,66 @@
-"""How many more flights each cell of a map gets: many where survival is uncertain, few elsewhere.
+"""How many more flights each cell of a map gets: many where success is uncertain, few elsewhere.
 
 Sampling goes in rounds. The first flies a few flights in every cell; after each round, every cell whose interval is
 still too wide gets another block, up to a limit per cell. With a budget for all cells together, those at a boundary
-go first: cells whose interval holds a survival of interest, or whose estimate lies on the other side of it than that
-of a neighbour. Nothing is drawn at random, so the same counts give the same next round.
+go first: cells whose interval holds a success rate of one half, or whose estimate lies on the other side of it than
+that of a neighbour. Nothing is drawn at random, so the same counts give the same next round.
 
 `intervals` covers with its level whatever the rule, the neighbours and the budget do; how, and what it was compared
-with, is said in `rotorfault.campaigns.sampling.sampling_plan`. What it needs is that the flights of one controller in one cell
-are independent of each other, and flown in an order of seeds that was fixed beforehand. Cells and controllers may
-share seeds: what they have in common decides when a cell is left, but not whether its own flights mislead.
+with, is said in `rotorfault.campaigns.sampling.sampling_plan`. What it needs is that the flights of one controller
+in one cell are independent of each other, and flown in an order of seeds that was fixed beforehand. Cells and
+controllers may share seeds: what they have in common decides when a cell is left, but not whether its own flights
+mislead.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
 
+from rotorfault.base.config import Strict, refusal
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.sampling.sampling_plan import Plan, sampling_plan
-from rotorfault.campaigns.sampling.statistics import Array, Interval, wilson
+from rotorfault.campaigns.sampling.statistics import Interval, wilson
 
 Counts = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
+BOUNDARY = 0.5  # success rate near which cells go first where a budget does not suffice for all
 
-class Refinement(NamedTuple):
-    """What a campaign asks for.
 
-    Attributes
-    ----------
-    initial : int
-        Flights in every cell in the first round.
-    block : int
-        Further flights of a cell in a round, at least.
-    growth : float
-        Further flights as a share of those there are, at least, in whole blocks: fewer rounds, some more flights.
-    width : float
-        Of a cell's interval, in (0, 1), at which the cell is done.
-    level : float
-        Chance, in (0, 1), with which a cell's interval covers.
-    most : int
-        Flights in a cell.
-    budget : int or None
-        Flights in all cells and of all controllers together.
-    survivals : tuple of float
-        In (0, 1), whose boundaries are of interest.
-    reserve : float
-        Share, in [0, 1), of the error that is kept for cells that the budget leaves unfinished.
-    """
+class Refinement(Strict):
+    """How many flights a cell gets."""
 
-    initial: int = 24
-    block: int = 24
-    growth: float = 0.1
-    width: float = 0.1
-    level: float = 0.95
-    most: int = 600
-    budget: int | None = None
-    survivals: tuple[float, ...] = (0.5,)
-    reserve: float = 0.1
+    initial: int = Field(default=24, ge=1, description="flights of a variant in each cell in the first round")
+    block: int = Field(default=24, ge=1, description="further flights in a round, at least")
+    growth: float = Field(default=0.5, ge=0.0, description="further flights as a share of those there are, at least")
+    width: float = Field(default=0.2, gt=0.0, lt=1.0, description="width of the interval at which a cell is done")
+    level: float = Field(default=0.95, gt=0.0, lt=1.0, description="chance with which an interval covers")
+    most: int = Field(default=240, ge=1, description="flights of a variant in a cell, at most")
+    budget: int | None = Field(default=None, ge=1, description="flights of all variants in all cells, at most")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Refinement:
+        if self.most < self.initial:
+            raise refusal("most", f"got {self.most}; allowed: at least initial, {self.initial}")
+        return self
 
 
 def looks(settings: Refinement) -> tuple[int, ...]:
-    """Numbers of flights that a cell can have after a round, ascending.
-
-    Raises
-    ------
-    InputError
-        If a setting is out of its range.
-    """
-    for name in ("initial", "block"):
-        if (value := getattr(settings, name)) < 1:
-            raise InputError(f"{name}: got {value}; allowed: 1 or more")
-    if settings.most < settings.initial:
-        raise InputError(f"most: got {settings.most}; allowed: at least initial, {settings.initial}")
-    if settings.growth < 0.0:
-        raise InputError(f"growth: got {settings.growth}; allowed: 0 or more")
-    found = [settings.initial]
-    while found[-1] < settings.most:
-        blocks = max(round(settings.growth * found[-1] / settings.block), 1)
-        found.append(min(found[-1] + blocks * settings.block, settings.most))
-    return tuple(found)
+    """Numbers of flights that a cell can have after a round, ascending."""
+    counts = [settings.initial]
+    while counts[-1] < settings.most:
+        # Whole blocks: fewer rounds, some more flights.
+        blocks = max(round(settings.growth * counts[-1] / settings.block), 1)
+        counts.append(min(counts[-1] + blocks * settings.block, settings.most))
+    return tuple(counts)
 
 
 def intervals(successes: ArrayLike, trials: ArrayLike, settings: Refinement) -> Interval:
-    """Interval of survival in each cell after any round of refinement.
+    """Interval of the success rate in each cell after any round of refinement.
 
     Parameters
     ----------
@@ -101,8 +76,8 @@ def intervals(successes: ArrayLike, trials: ArrayLike, settings: Refinement) -> 
     Raises
     ------
     InputError
-        If a setting is out of its range, or a cell has counts that refinement does not lead to: part of a block, or
-        flights beyond the round in which the cell was done.
+        If a cell has counts that refinement does not lead to: part of a block, or flights beyond the round in which
+        the cell was done.
     """
     plan = _plan(settings)
     _, n, at = _place(successes, trials, plan)
@@ -144,24 +119,24 @@ def further_flights(successes: ArrayLike, trials: ArrayLike, settings: Refinemen
             f"{n.size} cells; give fewer initial flights or a coarser map"
         )
     following = plan.looks[np.minimum(look + 1, len(plan.looks) - 1)] - plan.looks[look]
-    wanted = np.where(n == 0, first, np.where(finished(s, n, settings), 0, following))
+    further = np.where(n == 0, first, np.where(finished(s, n, settings), 0, following))
     if settings.budget is None:
-        return wanted
+        return further
     bounds = wilson(s, n, settings.level)  # only to choose by
-    boundary = _at_boundary(s, n, bounds, settings.survivals) | (n == 0)
-    if (boundary & (wanted > 0)).any():
-        wanted = np.where(boundary, wanted, 0)
+    boundary = _at_boundary(s, n, bounds) | (n == 0)
+    if (boundary & (further > 0)).any():
+        further = np.where(boundary, further, 0)
     # Widest first; of equal ones the first, so that the order is certain: rounding must not decide.
     order = np.argsort(-np.round(bounds.upper - bounds.lower, 9).ravel(), kind="stable")
-    order = order[wanted.ravel()[order] > 0]
+    order = order[further.ravel()[order] > 0]
     flat = np.zeros(n.size, dtype=np.int64)
-    affordable = np.cumsum(wanted.ravel()[order]) <= settings.budget - n.sum()
-    flat[order[affordable]] = wanted.ravel()[order[affordable]]
+    affordable = np.cumsum(further.ravel()[order]) <= settings.budget - n.sum()
+    flat[order[affordable]] = further.ravel()[order[affordable]]
     return flat.reshape(n.shape)
 
 
 def _plan(settings: Refinement) -> Plan:
-    return sampling_plan(looks(settings), settings.width, settings.level, settings.reserve)
+    return sampling_plan(looks(settings), settings.width, settings.level)
 
 
 def _place(successes: ArrayLike, trials: ArrayLike, plan: Plan) -> tuple[Counts, Counts, tuple[Any, Any]]:
@@ -174,22 +149,19 @@ def _place(successes: ArrayLike, trials: ArrayLike, plan: Plan) -> tuple[Counts,
     if wrong.any():
         cell = tuple(int(i) for i in np.argwhere(wrong)[0])
         raise InputError(
-            f"cell {cell} has {s[cell]} survivals of {n[cell]} flights, to which these settings do not lead; "
+            f"cell {cell} has {s[cell]} successes of {n[cell]} flights, to which these settings do not lead; "
             "count whole blocks only, and keep the settings of the first round"
         )
     return s, n, (look, s)
 
 
-def _at_boundary(s: Counts, n: Counts, bounds: Interval, survivals: tuple[float, ...]) -> Flags:
-    """Whether a cell may have a survival of interest, or lies next to one on the other side of it."""
-    estimate: Array = s / np.maximum(n, 1)
-    found = np.zeros(n.shape, dtype=bool)
-    for survival in survivals:
-        found |= (bounds.lower <= survival) & (survival <= bounds.upper)
-        above = estimate >= survival
-        for axis in range(1, n.ndim):  # the first is that of the controllers, who are not neighbours
-            differs = np.diff(above, axis=axis)  # exclusive or
-            padding = [(0, 0)] * n.ndim
-            for padding[axis] in ((0, 1), (1, 0)):
-                found |= np.pad(differs, padding)
-    return found
+def _at_boundary(s: Counts, n: Counts, bounds: Interval) -> Flags:
+    """Whether a cell's success rate may be `BOUNDARY`, or lies on the other side of it than that of a neighbour."""
+    near: Flags = (bounds.lower <= BOUNDARY) & (bounds.upper >= BOUNDARY)
+    above = s / np.maximum(n, 1) >= BOUNDARY
+    for axis in range(1, n.ndim):  # the first is that of the controllers, which are not neighbours
+        differs = np.diff(above, axis=axis)  # exclusive or
+        padding = [(0, 0)] * n.ndim
+        for padding[axis] in ((0, 1), (1, 0)):
+            near |= np.pad(differs, padding)
+    return near

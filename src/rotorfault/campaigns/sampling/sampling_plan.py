@@ -1,7 +1,7 @@
 r"""When a cell has been flown often enough, and an interval that holds although the flights themselves decided it.
 
 A cell is looked at after ``looks[0]``, ``looks[1]``, … flights and is done at the first look where its interval is
-narrow enough, or at the last one. Its flights are Bernoulli trials, so all orders of :math:`s` survivals in :math:`n`
+narrow enough, or at the last one. Its flights are Bernoulli trials, so all orders of :math:`s` successes in :math:`n`
 flights are equally likely, and the chance of ending there is
 
 .. math:: P_p(N = n, S = s) = h(n, s) \binom{n}{s} p^s (1 - p)^{n - s},
@@ -60,14 +60,14 @@ TIGHTENINGS = 20  # of the width at which a cell ends, until no interval is wide
 
 
 class Plan(NamedTuple):
-    """Where a cell ends and what its interval is, by look and by number of survivals.
+    """Where a cell ends and what its interval is, by look and by number of successes.
 
     Attributes
     ----------
     looks : ndarray of int, shape (K,)
         Flights in a cell at each look, ascending.
     reachable : ndarray of bool, shape (K, looks[-1] + 1)
-        Whether a cell can get there. False wherever the survivals are more than the flights.
+        Whether a cell can get there. False wherever the successes are more than the flights.
     done : ndarray of bool, shape (K, looks[-1] + 1)
         Whether a cell ends there.
     lower, upper : ndarray, shape (K, looks[-1] + 1)
@@ -136,7 +136,7 @@ def sampling_plan(looks: tuple[int, ...], width: float, level: float = 0.95, res
         table.reachable[k, : n + 1] = reachable
         table.done[k, : n + 1] = reachable & done[k]
         table.lower[k, : n + 1] = np.where(reachable, np.where(done[k], lower[k], left[0]), np.nan)
-        # Plans are the same with survivals and failures exchanged.
+        # Plans are the same with successes and failures exchanged.
         table.upper[k, : n + 1] = np.where(reachable, np.where(done[k], 1.0 - lower[k][::-1], left[1]), np.nan)
     for array in table:
         array.flags.writeable = False
@@ -154,17 +154,17 @@ def _check(looks: tuple[int, ...], width: float, level: float, reserve: float) -
 
 
 def _ends(n: int, width: float, level: float) -> Flags:
-    """Whether a cell with 0, 1, … n survivals is narrow enough, were n fixed."""
+    """Whether a cell with 0, 1, … n successes is narrow enough, were n fixed."""
     lower, upper = clopper_pearson(np.arange(n + 1), n, level)
     return np.asarray(upper - lower <= width)
 
 
 def _shares(looks: tuple[int, ...], done: list[Flags]) -> list[Array]:
-    """h(n, s): of the orders of s survivals in n flights, the share that no earlier look ends."""
+    """h(n, s): of the orders of s successes in n flights, the share that no earlier look ends."""
     shares = [np.ones(looks[0] + 1)]
     log_factorial = gammaln(np.arange(looks[-1] + 1) + 1.0)
     for n, m, ended in zip(looks, looks[1:], done, strict=False):
-        now = np.arange(m + 1)[:, None]  # survivals at the later look
+        now = np.arange(m + 1)[:, None]  # successes at the later look
         added = np.arange(m - n + 1)[None, :]  # of these since the earlier one
         before = now - added
         possible = (before >= 0) & (before <= n)
@@ -203,7 +203,7 @@ def _lower_bounds(looks: tuple[int, ...], done: list[Flags], shares: list[Array]
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = np.log(above[rows, left]), np.log(above[rows, right])
         part = np.where(high > low, (np.log(error) - low) / (high - low), 0.0)
-    found = np.sin(angle[left] + np.clip(part, 0.0, 1.0) * (angle[right] - angle[left])) ** 2
+    bound = np.sin(angle[left] + np.clip(part, 0.0, 1.0) * (angle[right] - angle[left])) ** 2
     flat = np.full(len(n), np.nan)
-    flat[at] = np.where(right == 0, 0.0, found)
+    flat[at] = np.where(right == 0, 0.0, bound)
     return np.split(flat, np.cumsum([m + 1 for m in looks])[:-1])

@@ -1,10 +1,10 @@
-r"""Intervals of survival from counts, correction for many tests, quantiles.
+r"""Intervals of success rates from counts, and the correction for many tests.
 
-With :math:`s` survivals of :math:`n` flights:
+With :math:`s` successes of :math:`n` flights:
 
 =================  ===================================================================================================
 wilson             E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209-212
-clopper-pearson    C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404-413: covers for every probability
+clopper_pearson    C. J. Clopper and E. S. Pearson, Biometrika 26 (1934) 404-413: covers for every probability
 holm               S. Holm, Scand. J. Stat. 6 (1979) 65-70
 =================  ===================================================================================================
 
@@ -14,14 +14,13 @@ there are, those of `rotorfault.campaigns.sampling.refine` hold.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaincinv, ndtri
 
-from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -73,29 +72,10 @@ def clopper_pearson(successes: ArrayLike, trials: ArrayLike, level: float = 0.95
     """Exact interval of a proportion: covers at least its level, for every proportion. Arguments as of `wilson`."""
     s, n = _counts(successes, trials, level)
     tail = (1.0 - level) / 2.0
-    some, missing = np.maximum(s, 1.0), np.maximum(n - s, 1.0)  # where not, the bound is known
+    some, missing = np.maximum(s, 1.0), np.maximum(n - s, 1.0)  # where they are 0, the bound is known
     lower = np.where(s == 0, 0.0, betaincinv(some, n - s + 1.0, tail))
     upper = np.where(s == n, 1.0, betaincinv(s + 1.0, missing, 1.0 - tail))
     return Interval(lower, upper)
-
-
-INTERVALS: dict[str, Callable[[ArrayLike, ArrayLike, float], Interval]] = {
-    "wilson": wilson,
-    "clopper-pearson": clopper_pearson,
-}
-
-
-def proportion_interval(method: str, successes: ArrayLike, trials: ArrayLike, level: float = 0.95) -> Interval:
-    """Interval of a proportion by the name of the method: wilson or clopper-pearson.
-
-    Raises
-    ------
-    InputError
-        If there is no such method, and as `wilson` does.
-    """
-    if method not in INTERVALS:
-        raise InputError(unknown("interval", method, list(INTERVALS)))
-    return INTERVALS[method](successes, trials, level)
 
 
 def holm(p_values: ArrayLike) -> Array:
@@ -113,40 +93,6 @@ def holm(p_values: ArrayLike) -> Array:
     steps = np.arange(len(order), 0, -1)
     corrected[order] = np.minimum(np.maximum.accumulate(steps * flat[order]), 1.0)
     return corrected.reshape(p.shape)
-
-
-def quantiles(values: ArrayLike, probabilities: ArrayLike, axis: int = -1) -> Array:
-    """Quantiles of what is not NaN, linear between values; NaN, silently, where there is nothing.
-
-    Parameters
-    ----------
-    values : array_like
-    probabilities : array_like, shape (Q,)
-        In [0, 1].
-    axis : int, optional
-        Along which there are many values.
-
-    Returns
-    -------
-    ndarray, shape (Q, ...)
-        The other axes of the values come last.
-    """
-    ordered = np.sort(np.moveaxis(np.asarray(values, dtype=float), axis, -1), axis=-1)  # NaN comes last
-    count = (~np.isnan(ordered)).sum(axis=-1)
-    wanted = np.asarray(probabilities, dtype=float)
-    found = np.full((len(wanted), *count.shape), np.nan)
-    if ordered.shape[-1] == 0:
-        return found
-    for k, probability in enumerate(wanted):
-        place = probability * np.maximum(count - 1, 0)
-        below = np.floor(place).astype(int)
-        above = np.minimum(below + 1, np.maximum(count - 1, 0))
-        low, high = (np.take_along_axis(ordered, i[..., None], axis=-1)[..., 0] for i in (below, above))
-        # Without the choice, no part of an infinite value would be NaN.
-        part = place - below
-        with np.errstate(invalid="ignore"):
-            found[k] = np.where(part == 0.0, low, (1.0 - part) * low + part * high)
-    return found
 
 
 def _counts(successes: ArrayLike, trials: ArrayLike, level: float) -> tuple[Array, Array]:

@@ -12,8 +12,14 @@ from rotorfault.campaigns.store.identity import Identity, read_identity
 STUDY, PARTS, DAMAGED, LOCK, FLIGHTS = "study.json", "parts", "damaged", "lock", "flights.parquet"
 
 
-def see_that_it_is_vacant(folder: Path, wanted: Identity) -> None:
-    """Whether a campaign can start here; what a kill at its very start leaves is no hindrance.
+def require_vacant(folder: Path, campaign: Identity) -> None:
+    """Refuse a folder in which a campaign cannot start; what a kill at its very start leaves is no hindrance.
+
+    Parameters
+    ----------
+    folder : Path
+    campaign : Identity
+        Of the one that is to start.
 
     Raises
     ------
@@ -27,10 +33,9 @@ def see_that_it_is_vacant(folder: Path, wanted: Identity) -> None:
     try:
         names = sorted(path.name for path in folder.iterdir())
         if STUDY in names:
-            kept = read_identity(folder / STUDY)
-            other = kept.unlike(wanted.study, wanted.program)
-            known = "holds this campaign already; complete it with --resume, or give another --out"
-            raise InputError(f"{folder}: {other or known}")
+            difference = read_identity(folder / STUDY).unlike(campaign.study, campaign.program)
+            same = "holds this campaign already; complete it with --resume, or give another --out"
+            raise InputError(f"{folder}: {difference or same}")
         ours = [name for name in names if name in (LOCK, PARTS) or is_leftover(name)]
         foreign = [name for name in names if name not in ours]
         if PARTS in names:
@@ -44,13 +49,20 @@ def see_that_it_is_vacant(folder: Path, wanted: Identity) -> None:
         raise InputError(f"{folder}: holds files that are not of a campaign ({foreign[0]}{more}); give another --out")
 
 
-def see_that_there_is_space(folder: Path, needed: int) -> None:
-    """Whether the disk that the folder is or will be on has as many bytes left.
+def require_space(folder: Path, needed: int) -> None:
+    """Refuse a folder whose disk is too full.
+
+    Parameters
+    ----------
+    folder : Path
+        May not be there yet.
+    needed : int
+        Bytes.
 
     Raises
     ------
     InputError
-        If it has not.
+        If less is free.
     """
     place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     free = shutil.disk_usage(place).free
@@ -66,7 +78,7 @@ def _size(count: int) -> str:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove the unfinished files of a killed run; only for who holds the lock."""
+    """Remove the unfinished files of a killed run; only for the holder of the lock."""
     for path in [*folder.glob(".*.tmp"), *(folder / PARTS).glob(".*.tmp")]:
         if is_leftover(path.name):
             path.unlink(missing_ok=True)
@@ -82,8 +94,13 @@ def move_aside(folder: Path, name: str) -> None:
     (folder / PARTS / name).rename(target)
 
 
-def write(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write a file of a campaign, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    content : bytes
 
     Raises
     ------
@@ -94,5 +111,6 @@ def write(path: Path, content: bytes) -> None:
         write_durably(path, content)
     except OSError as error:
         raise InputError(
-            f"{path}: cannot be written ({error.strerror}); mend that and go on with --resume; what was flown is kept"
+            f"{path}: cannot be written ({error.strerror}); make it writable, or make room, and go on with --resume; "
+            "what was flown is kept"
         ) from None

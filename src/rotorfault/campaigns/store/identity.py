@@ -15,7 +15,7 @@ from rotorfault.base.versions import versions
 FORMAT = 1  # of the folder
 # Numbers of a flight may change with these. The other versions are kept for the record.
 _DECIDING = ("rotorfault", "numpy", "scipy", "llvmlite")
-_MEND = "restore it from a copy, or start the campaign anew with another --out"
+_REMEDY = "restore it from a copy, or start the campaign anew with another --out"
 
 
 class Identity(NamedTuple):
@@ -51,8 +51,8 @@ class Identity(NamedTuple):
         program : str or None
             Not compared where None.
         """
-        if study is not None and (found := _first_difference(self.study, _plain(study))):
-            return f"holds a campaign of another study ({found}); give another --out"
+        if study is not None and (difference := _first_difference(self.study, _plain(study))):
+            return f"holds a campaign of another study ({difference}); give another --out"
         if program is None:
             return None
         here = _versions()
@@ -90,22 +90,22 @@ def read_identity(path: Path) -> Identity:
     """
     try:
         content = json.loads(path.read_bytes())
-        kept = content["format"]
-        if isinstance(kept, int) and kept > FORMAT:
+        file_format = content["format"]
+        if isinstance(file_format, int) and file_format > FORMAT:
             version = content["versions"]["rotorfault"]
             raise InputError(
-                f"{path}: has format {kept}; this version reads up to {FORMAT}; use rotorfault {version}"
+                f"{path}: has format {file_format}; this version reads up to {FORMAT}; use rotorfault {version}"
             )
-        found = Identity(content["study"], content["digests"]["program"], content["versions"])
-        if json.loads(found.encoded()) != content:
-            raise InputError(f"{path}: has changed since it was written; {_MEND}")
+        campaign = Identity(content["study"], content["digests"]["program"], content["versions"])
+        if json.loads(campaign.encoded()) != content:
+            raise InputError(f"{path}: has changed since it was written; {_REMEDY}")
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); mend that") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}); fix its permissions and retry") from None
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(f"{path}: is damaged or was not written by rotorfault; {_MEND}") from None
-    return found
+        raise InputError(f"{path}: is damaged or was not written by rotorfault; {_REMEDY}") from None
+    return campaign
 
 
 def _versions() -> dict[str, str]:
@@ -133,8 +133,8 @@ def _first_difference(there: Any, here: Any, key: str = "") -> str | None:
         # 1 and 1.0 are the same number; true is none.
         same = there == here and isinstance(there, bool) == isinstance(here, bool)
         return None if same else f"{key}: {_short(there)} there, {_short(here)} here"
-    found = (_first_difference(*pair, f"{key}.{name}" if key else name) for name, pair in pairs.items())
-    return next((one for one in found if one), None)
+    differences = (_first_difference(*pair, f"{key}.{name}" if key else name) for name, pair in pairs.items())
+    return next((difference for difference in differences if difference), None)
 
 
 def _short(value: Any) -> str:

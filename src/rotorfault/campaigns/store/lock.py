@@ -46,7 +46,7 @@ class Lock:
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             raise InputError(
-                f"{path}: cannot be written ({error.strerror}); mend that or give another --out"
+                f"{path}: cannot be written ({error.strerror}); fix its permissions or give another --out"
             ) from None
         try:
             _take(handle)

@@ -44,14 +44,14 @@ def canonical(table: pa.Table) -> pa.Table:
             kind = kind.value_type
         if pa.types.is_large_string(kind) or kind == pa.string_view():
             kind = pa.string()
-        known = (
+        allowed = (
             pa.types.is_integer,
             pa.types.is_float32,
             pa.types.is_float64,
             pa.types.is_boolean,
             pa.types.is_string,
         )
-        if not any(is_one(kind) for is_one in known):
+        if not any(is_one(kind) for is_one in allowed):
             raise ValueError(f"column '{name}' has type {kind}; allowed: integer, float32, float64, bool, string")
         columns.append(column.cast(kind))
         fields.append(pa.field(name, kind))
@@ -119,10 +119,10 @@ def decode(content: bytes) -> tuple[dict[str, Any], pa.Table]:
         file = pq.ParquetFile(pa.BufferReader(content))
         about: dict[str, Any] = json.loads(file.metadata.metadata[_ABOUT.encode()])
         table = file.read(use_threads=False).replace_schema_metadata(None).combine_chunks()
-        told = about["sha256"]
+        digest = about["sha256"]
     except (pa.ArrowException, OSError, ValueError, KeyError, TypeError) as error:
         raise DamagedError(f"cannot be read ({str(error).splitlines()[0]})") from None
-    if told != content_digest(table):
+    if digest != content_digest(table):
         raise DamagedError("holds other numbers than were written")
     return about, table
 

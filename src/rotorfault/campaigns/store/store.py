@@ -10,13 +10,15 @@
 
 A part appears whole, by one rename, and is never written again; so a kill costs the blocks that were in flight and
 nothing else, and any Parquet reader may look at the folder at any time. Every part names its campaign, round and
-block and carries digests (`rotorfault.campaigns.store.parquet`), so that what is damaged, foreign or misplaced is found.
+block and carries digests (`rotorfault.campaigns.store.parquet`), so that what is damaged, foreign or misplaced is
+found. Every part is checked when it is read. While a store holds the lock nobody else writes, so it reads each part
+once.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, final
@@ -32,9 +34,9 @@ from rotorfault.campaigns.store.folder import (
     STUDY,
     move_aside,
     remove_leftovers,
-    see_that_it_is_vacant,
-    see_that_there_is_space,
-    write,
+    require_space,
+    require_vacant,
+    write_whole,
 )
 from rotorfault.campaigns.store.identity import Identity, identity, read_identity
 from rotorfault.campaigns.store.lock import Lock
@@ -67,10 +69,11 @@ class Store:
         Parts that were moved aside when it was opened.
     """
 
-    def __init__(self, folder: Path, kept: Identity, lock: Lock | None) -> None:
-        self.folder, self.identity, self._lock = folder, kept, lock
+    def __init__(self, folder: Path, campaign: Identity, lock: Lock | None) -> None:
+        self.folder, self.identity, self._lock = folder, campaign, lock
         self.repaired: tuple[Damage, ...] = ()
         self._checked: set[Key] = set()
+        self._parts: dict[Key, pa.Table] = {}  # that were written or read under the lock; `finish` needs them all
         self._schema: pa.Schema | None = None
 
     @classmethod
@@ -94,9 +97,9 @@ class Store:
             If the folder holds a campaign or anything else, is a file, cannot be written, is being written by another
             process, or has less space.
         """
-        wanted = identity(study, digest)
-        see_that_it_is_vacant(folder, wanted)
-        see_that_there_is_space(folder, space)
+        campaign = identity(study, digest)
+        require_vacant(folder, campaign)
+        require_space(folder, space)
         try:
             (folder / PARTS).mkdir(parents=True, exist_ok=True)
         except (FileExistsError, NotADirectoryError):
@@ -105,20 +108,20 @@ class Store:
             raise InputError(f"{folder}: cannot be written ({error.strerror}); give another --out") from None
         lock = Lock(folder / LOCK)
         try:
-            see_that_it_is_vacant(folder, wanted)  # another process may have been as fast
+            require_vacant(folder, campaign)  # another process may have been as fast
             remove_leftovers(folder)
-            write(folder / STUDY, wanted.encoded())
+            write_whole(folder / STUDY, campaign.encoded())
         except BaseException:
             lock.release()
             raise
-        return cls(folder, wanted, lock)
+        return cls(folder, campaign, lock)
 
     @classmethod
     def open(
         cls, folder: Path, *, study: dict[str, Any] | None = None, digest: str | None = None,
         write: bool = False, repair: bool = False,
     ) -> Store:  # fmt: skip
-        """Open a campaign: to read, also while another process writes it, or to go on with it.
+        """Open a campaign: to read, also while another process writes it, or to resume it.
 
         Parameters
         ----------
@@ -126,7 +129,7 @@ class Store:
         study, digest : dict, str, optional
             As for `create`; where given, the campaign must be of this study, and flown by this program.
         write : bool, optional
-            Go on with it: it is locked, all its parts are checked now, leftovers of a killed run are removed.
+            Resume it: it is locked, all its parts are checked now, leftovers of a killed run are removed.
         repair : bool, optional
             Move damaged parts aside, to ``damaged/``; they are then missing and are listed in `repaired`. Writes.
 
@@ -140,12 +143,12 @@ class Store:
             raise InputError(f"{folder}: {what}; give the folder of a campaign")
         if not (folder / STUDY).is_file():
             raise InputError(f"{folder}: holds no campaign (no {STUDY}); give the folder of one")
-        kept = read_identity(folder / STUDY)
-        if other := kept.unlike(study, digest):
-            raise InputError(f"{folder}: {other}")
+        campaign = read_identity(folder / STUDY)
+        if difference := campaign.unlike(study, digest):
+            raise InputError(f"{folder}: {difference}")
         if not (write or repair):
-            return cls(folder, kept, None)
-        store = cls(folder, kept, Lock(folder / LOCK))
+            return cls(folder, campaign, None)
+        store = cls(folder, campaign, Lock(folder / LOCK))
         try:
             store._take_over(repair)
         except BaseException:
@@ -177,7 +180,7 @@ class Store:
             If it cannot be written, as on a full disk: then nothing is left behind. Or if the block is there already
             with other results: then they depend on something that they must not depend on.
         """
-        self._see_that_it_writes()
+        self._require_lock()
         table = _as_part(round, block, table)
         path = self.path(round, block)
         if self._schema is not None and table.schema != self._schema:
@@ -186,9 +189,8 @@ class Store:
             if content_digest(self.get(round, block)) != content_digest(table):
                 raise InputError(f"{path}: is there already with other results; start anew with another --out")
             return
-        write(path, encode(table, {"campaign": self.identity.campaign, _ROUND: round, _BLOCK: block}))
-        self._schema = table.schema
-        self._checked.add((round, block))
+        write_whole(path, encode(table, {"campaign": self.identity.campaign, _ROUND: round, _BLOCK: block}))
+        self._remember((round, block), table)
 
     def get(self, round: int, block: int) -> pa.Table:
         """The results of a block, sorted by flight, behind columns ``round`` and ``block``.
@@ -202,7 +204,7 @@ class Store:
         if not path.exists():
             raise InputError(f"{path}: is not flown yet; complete the campaign with --resume")
         try:
-            return self._read((round, block))
+            return self._part((round, block))
         except DamagedError as error:
             raise _refusal(self.folder, [Damage(path.name, str(error))]) from None
 
@@ -214,15 +216,10 @@ class Store:
         InputError
             If a part is damaged; names it.
         """
-        found, damages = self._survey()
+        sound, damages = self._survey(self._checked)
         if damages:
             raise _refusal(self.folder, damages)
-        return found
-
-    def missing(self, blocks: Iterable[Key]) -> list[Key]:
-        """Those of the blocks that have no results yet, in the order given."""
-        done = self.done()
-        return [key for key in blocks if key not in done]
+        return set(sound)
 
     def table(self) -> pa.Table:
         """All results, sorted by round, block and flight: the same, however they came about.
@@ -232,10 +229,12 @@ class Store:
         InputError
             If there are none, or one is damaged.
         """
-        done = sorted(self.done())
-        if not done:
+        parts, damages = self._survey()
+        if damages:
+            raise _refusal(self.folder, damages)
+        if not parts:
             raise InputError(f"{self.folder}: no block is flown yet; complete the campaign with --resume")
-        return pa.concat_tables([self.get(*key) for key in done]).combine_chunks()
+        return pa.concat_tables([parts[key] for key in sorted(parts)]).combine_chunks()
 
     def finish(self, blocks: Iterable[Key] | None = None) -> Path:
         """Write ``flights.parquet``: all results in one file, the same bytes however they came about.
@@ -250,19 +249,20 @@ class Store:
         InputError
             If blocks are missing or too many, damaged, or the file cannot be written.
         """
-        self._see_that_it_writes()
-        if blocks is not None and (wrong := set(blocks) ^ self.done()):
-            path = self.path(*min(wrong))
+        self._require_lock()
+        if blocks is not None and (difference := set(blocks) ^ self.done()):
+            path = self.path(*min(difference))
             what = "belongs to no block of this campaign; move it away" if path.exists() else "is not flown yet"
             raise InputError(f"{path}: {what}")
         about = {"campaign": self.identity.campaign, "study": self.study, "versions": self.identity.versions}
         content, path = encode(self.table(), about), self.folder / FLIGHTS
         if not path.is_file() or path.read_bytes() != content:
-            write(path, content)
+            write_whole(path, content)
         return path
 
     def close(self) -> None:
         """Let others write."""
+        self._parts.clear()
         if self._lock is not None:
             self._lock.release()
 
@@ -287,16 +287,22 @@ class Store:
             for damage in damages:
                 move_aside(self.folder, damage.name)
         except OSError as error:
-            raise InputError(f"{self.folder}: cannot be written ({error.strerror}); mend that") from None
+            raise InputError(
+                f"{self.folder}: cannot be written ({error.strerror}); fix its permissions and retry"
+            ) from None
         self.repaired = tuple(damages)
 
-    def _see_that_it_writes(self) -> None:
-        if self._lock is None or not self._lock.held:
+    @property
+    def _writes(self) -> bool:
+        return self._lock is not None and self._lock.held
+
+    def _require_lock(self) -> None:
+        if not self._writes:
             raise RuntimeError("this store was opened to read, was closed, or belongs to the parent process")
 
-    def _survey(self) -> tuple[set[Key], list[Damage]]:
-        """Sound blocks, and parts that are not."""
-        found: set[Key] = set()
+    def _survey(self, unread: Container[Key] = ()) -> tuple[dict[Key, pa.Table | None], list[Damage]]:
+        """Sound blocks with their tables, and parts that are not sound; None for blocks that need not be read."""
+        sound: dict[Key, pa.Table | None] = {}
         damages = []
         for path in sorted((self.folder / PARTS).glob("*.parquet")):
             key = _key(path.name)
@@ -304,12 +310,19 @@ class Store:
                 damages.append(Damage(path.name, "is no name of a part (round-RRR-block-BBBBB.parquet)"))
                 continue
             try:
-                if key not in self._checked:
-                    self._read(key)
-                found.add(key)
+                sound[key] = None if key in unread else self._part(key)
             except DamagedError as error:
                 damages.append(Damage(path.name, str(error)))
-        return found, damages
+        return sound, damages
+
+    def _part(self, key: Key) -> pa.Table:
+        return self._parts[key] if key in self._parts else self._read(key)
+
+    def _remember(self, key: Key, table: pa.Table) -> None:
+        self._schema = table.schema
+        self._checked.add(key)
+        if self._writes:
+            self._parts[key] = table
 
     def _read(self, key: Key) -> pa.Table:
         path = self.path(*key)
@@ -318,7 +331,7 @@ class Store:
         except IsADirectoryError:
             raise DamagedError("is a folder") from None
         except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror}); mend that") from None
+            raise InputError(f"{path}: cannot be read ({error.strerror}); fix its permissions and retry") from None
         about, table = decode(content)
         if about.get("campaign") != self.identity.campaign:
             raise DamagedError("belongs to another campaign")
@@ -326,8 +339,7 @@ class Store:
             raise DamagedError(f"holds round {about.get(_ROUND)}, block {about.get(_BLOCK)}: copied or renamed")
         if self._schema is not None and table.schema != self._schema:
             raise DamagedError(f"has other columns than the parts before it: {_unlike(table.schema, self._schema)}")
-        self._schema = table.schema
-        self._checked.add(key)
+        self._remember(key, table)
         return table
 
 

@@ -1,4 +1,4 @@
-"""Studies that come with rotorfault, as TOML files."""
+"""Built-in studies, as TOML files, and their names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper's claims need of a flight beyond its summary; kept beside each summary by `Store`.
+"""What the paper's claims need of a flight beyond its summary; kept beside each summary by `RunStore`.
 
 All numbers come from the flight's records and the configuration in its attributes. A flight that ends early gives
 numbers up to its end; what cannot be had from so few records is None. Total variation and spectrum see nothing

@@ -24,7 +24,7 @@ from rotorfault.studies.paper.measures import LABEL, measure
 from rotorfault.studies.paper.page import Page, render
 from rotorfault.studies.paper.verdicts import Claim, claims_json
 from rotorfault.studies.pool import fly_missing
-from rotorfault.studies.runs import Result, Run, Store
+from rotorfault.studies.runs import Result, Run, RunStore
 
 
 class Reproduced(NamedTuple):
@@ -59,7 +59,7 @@ def selected(case: str | None, controller: str | None) -> list[Run]:
 
 def fly_part(folder: Path, case: str | None, controller: str | None, workers: int | None = None) -> list[Result]:
     """Fly one case or controller alone, without report."""
-    store = Store(output_folder(folder), measure, LABEL)
+    store = RunStore(output_folder(folder), measure, LABEL)
     runs = selected(case, controller)
     fly_missing(store, runs, "flying", workers)
     return [store.get(run) for run in runs]
@@ -76,7 +76,7 @@ def reproduce(folder: Path, quick: bool = False, workers: int | None = None) -> 
     workers : int, optional
         Processes; one per core if not given.
     """
-    store = Store(output_folder(folder), measure, LABEL)
+    store = RunStore(output_folder(folder), measure, LABEL)
     wanted = [*main_runs(), *matched_runs(), *table1.runs(), *claims.runs()]
     if not quick:
         wanted += [*ablation.runs(), *sensitivity.runs()]

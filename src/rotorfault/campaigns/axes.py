@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.plant.sensors import Noisy
 
 Columns = dict[str, NDArray[Any]]
 
@@ -51,7 +52,13 @@ def _ramp(values: Mapping[str, NDArray[Any]]) -> Columns:
     return {"fault.0.start": np.array(start), "fault.0.end": start + np.maximum(length, 1e-3)}
 
 
-_NOISE = {"position": 0.005, "velocity": 0.01, "attitude": 0.002, "rate": 0.005}  # defaults of `noisy`
+def _noise(values: Mapping[str, NDArray[Any]]) -> Columns:
+    factor = np.asarray(values["sensor_noise"], dtype=float)
+    defaults = Noisy.Settings.model_validate({})
+    return {
+        f"sensors.{name}": factor * getattr(defaults, name) for name in ("position", "velocity", "attitude", "rate")
+    }
+
 
 AXES: dict[str, Axis] = {
     "rotor": Axis("", "rotor of the first fault, 1 to 4", _key("rotor", "fault.0.rotor"), (1, 4)),
@@ -80,12 +87,7 @@ AXES: dict[str, Axis] = {
         _key("battery_sag", "mismatch.rotor_gain", scale=lambda x: 1.0 - np.asarray(x, dtype=float)), (0.0, 0.99),
     ),
     "sensor_noise": Axis(
-        "1", "factor on the standard noise (sensors noisy)",
-        lambda values: {
-            f"sensors.{name}": np.asarray(values["sensor_noise"], dtype=float) * sigma
-            for name, sigma in _NOISE.items()
-        },
-        (0.0, np.inf),
+        "1", "factor on the standard noise (sensors noisy)", _noise, (0.0, np.inf)
     ),
     "sensor_delay": Axis(
         "", "sampling periods by which measurements come late (sensors noisy)", _key("sensor_delay", "sensors.delay"),
@@ -121,8 +123,8 @@ def axis(name: str) -> Axis:
 def columns(values: Mapping[str, NDArray[Any]]) -> Columns:
     """Columns of the scenario for values of axes, one per flight."""
     count = max((len(np.atleast_1d(v)) for v in values.values()), default=1)
-    found: Columns = {}
-    for name in values:
-        for key, column in axis(name).keys(values).items():
-            found[key] = np.array(np.broadcast_to(column, (count,)))
-    return found
+    return {
+        key: np.array(np.broadcast_to(column, (count,)))
+        for name in values
+        for key, column in axis(name).keys(values).items()
+    }
