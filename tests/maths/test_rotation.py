@@ -157,9 +157,7 @@ def test_turning_about_the_vertical_adds_to_the_yaw_and_nothing_else(euler: Vec3
 
 
 @given(angles, vectors, angles)
-def test_a_quaternion_of_angles_is_the_plain_one_in_all_that_it_does(
-    euler: Vec3, omega_B: Vec3, other: Vec3
-) -> None:
+def test_a_quaternion_of_angles_is_the_plain_one_in_all_that_it_does(euler: Vec3, omega_B: Vec3, other: Vec3) -> None:
     knows = Quat.from_euler(euler)
     same, q = plain(knows), plain(Quat.from_euler(other))
     assert isinstance(knows, OfAngles)
@@ -187,7 +185,7 @@ def test_what_is_computed_with_it_forgets_the_angles(euler: Vec3) -> None:
     knows = Quat.from_euler(euler)
     for result in (knows @ Quat.identity(), knows.conjugate(), knows * 1.0, knows.normalised(), knows + knows):
         assert type(result) is Quat
-    # Put together again of its numbers, as engines do, it is as good as plain: stale angles would be another attitude.
+    # Put together again of its numbers, as engines do, it is plain: stale angles would be another attitude.
     moved = plain(Quat.from_euler(euler + Vec3(0.1, 0.0, 0.0)))
     rebuilt = unflatten(knows, flatten(moved))
     assert array(rebuilt).tolist() == array(moved).tolist()

@@ -24,7 +24,7 @@ class Quat(Value):
         # Whether it still knows its angles (`OfAngles`) makes no other quaternion of it.
         return isinstance(other, Quat) and all(a == b for a, b in zip(self, other, strict=True))
 
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
 
     @classmethod
     def identity(cls) -> Quat:
@@ -115,7 +115,7 @@ class Quat(Value):
 
     @classmethod
     def small(cls, rotation: Vec3) -> Quat:
-        """The rotation about a small rotation vector in rad; of unit length, its angle wrong by a twelfth of its cube."""
+        """The rotation by a small rotation vector in rad; of unit length, the angle short by a twelfth of its cube."""
         half = rotation * 0.5
         scale = 1.0 / sqrt(1.0 + half.dot(half))
         return cls(scale, half.x * scale, half.y * scale, half.z * scale)
