@@ -38,18 +38,18 @@ REGISTRIES: dict[str, Registry[Any]] = {
 
 def entries() -> dict[str, dict[str, str]]:
     """One line about each thing, by group and name."""
-    found: dict[str, dict[str, str]] = {
+    groups: dict[str, dict[str, str]] = {
         "scenarios": {name: _description("rotorfault.scenario.builtin", name) for name in scenario_names()},
         "vehicles": {name: _description("rotorfault.model.vehicles", name) for name in vehicle_names()},
     }
     for group, registry in REGISTRIES.items():
-        found[group] = {name: registry.summary(name) for name in registry}
-    for name in found["controllers"]:
-        known = presets(name)
-        found["controllers"][name] += f" Presets: {', '.join(known)}." if known else ""
-    found["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
-    found["engines"] = dict(ENGINES)
-    return found
+        groups[group] = {name: registry.summary(name) for name in registry}
+    for name in groups["controllers"]:
+        names = presets(name)
+        groups["controllers"][name] += f" Presets: {', '.join(names)}." if names else ""
+    groups["studies"] = {name: _description("rotorfault.campaigns.studies", name) for name in study_names()}
+    groups["engines"] = dict(ENGINES)
+    return groups
 
 
 def _description(package: str, name: str) -> str:
