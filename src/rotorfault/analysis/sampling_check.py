@@ -10,8 +10,8 @@ nominal axis is therefore closed again through a zero-order hold and a first-ord
 and an axis is reported if a sampled pole z is outside the unit circle or its damping -Re(log z)/|log z| is below
 `LEAST_DAMPING`. Source of the sampling: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997,
 section 3.2. A warning therefore proves that the nominal gains are too fast; the absence of a warning proves nothing:
-x and y are taken to have the rotors' lag only, as if the attitude followed at once, and coupling, limits and switching
-inputs are left out. `rotorfault.analysis.linearisation` has the whole loop in hover.
+x and y are taken to have the rotors' lag only, as if the attitude followed at once, and coupling, limits and
+switching inputs are left out. `rotorfault.analysis.linearisation` has the whole loop in hover.
 """
 
 from __future__ import annotations

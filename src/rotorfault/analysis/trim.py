@@ -2,8 +2,8 @@
 
 What ``rotorfault trim VEHICLE`` prints. Hover is closed form; poles and margins come from
 `rotorfault.analysis.linearisation` and `rotorfault.analysis.margins`, on the full rigid body without wind and faults,
-with diagnosis `off` and allocation `nominal`: an observer acts on the motion only through its decision. A loss changes
-nothing in them; `rotorfault.analysis.hover` says whether hover is still possible with it.
+with diagnosis `off` and allocation `nominal`: an observer acts on the motion only through its decision. A loss
+changes nothing in them; `rotorfault.analysis.hover` says whether hover is still possible with it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Terms: the symbols on which the closed loop is run once, so that only its arithmetic is kept.
 
-A `Term` carries + - * / and the functions of `rotorfault.maths.scalar`. Equal operations on equal arguments are the same
-term, so what several equations share is computed once. Each term knows its *level*: 0 a number, 1 a function of the
-flight's parameters alone, 2 anything that changes during a flight. Terms of level 1 are computed once per flight,
+A `Term` carries + - * / and the functions of `rotorfault.maths.scalar`. Equal operations on equal arguments are the
+same term, so what several equations share is computed once. Each term knows its *level*: 0 a number, 1 a function of
+the flight's parameters alone, 2 anything that changes during a flight. Terms of level 1 are computed once per flight,
 before it begins (see `rotorfault.engine.program`).
 
 A division by a parameter becomes a multiplication by its reciprocal; against plain floats that differs by rounding
