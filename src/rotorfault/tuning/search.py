@@ -25,8 +25,8 @@ from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.space import SPACES, settings_at
 from rotorfault.tuning.training import objective, training_groups
 
-# Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which is
-# known to fly, and not at the bounds.
+# Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which
+# flies, and not at the bounds.
 SPREAD = 0.15
 
 

@@ -33,8 +33,8 @@ from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
 
-# Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many does
-# not hide what the others are worth.
+# Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many
+# does not hide what the others are worth.
 LOST = 10.0
 # Of the time of the fault, for a flight that had not settled by then: more would ask for settling before the fault at
 # any price, less would reward those that wait for it.
