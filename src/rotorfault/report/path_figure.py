@@ -37,8 +37,9 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
         axes.plot(visible[kept, 0], visible[kept, 1], low[2], color="0.8", linewidth=0.7, zorder=1)
         axes.plot(*visible[:1].T, **START, markeredgecolor=flight.colour, zorder=6)
         for time in sorted(set(flight.onsets.values())):
-            at = visible[int(np.searchsorted(flight.time, time))]
-            axes.plot(*at[:, None], **FAULT, markerfacecolor=flight.colour, zorder=7)
+            # Between the last record and the end of the flight there is no place to mark.
+            at = visible[int(np.searchsorted(flight.time, time)) :][:1]
+            axes.plot(*at.T, **FAULT, markerfacecolor=flight.colour, zorder=7)
         if flight.fate:
             axes.plot(*visible[-1:].T, **END, color=flight.colour, zorder=7)
     others = _targets(axes, drawn)
