@@ -213,7 +213,7 @@ def _slot_setting(slot: Slot[Any], field: FieldInfo) -> Setting:
     default = "required" if field.is_required() else "none" if empty else f"`{slot.default}`"
     allowed = "list of tables with `kind`" if slot.many else "table with `kind`, or a bare name"
     if slot.shorthand is not None:
-        allowed += " or number"
+        allowed = "table with `kind`, a bare name, or a number"
     return Setting(slot.name, default, allowed, "", slot.about)
 
 
