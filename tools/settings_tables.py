@@ -63,7 +63,7 @@ def settings(model: type[BaseModel], prefix: str = "") -> Iterator[Setting]:
             for setting in settings(inner, f"{prefix}{name}."):
                 if isinstance(defaults, BaseModel):
                     # What counts is the default of the outer model, which fills the inner one.
-                    value = defaults
+                    value: Any = defaults
                     for part in setting.key.removeprefix(f"{prefix}{name}.").split("."):
                         value = getattr(value, part, PydanticUndefined)
                     setting = setting if value is PydanticUndefined else setting._replace(default=_value(value))
@@ -130,7 +130,7 @@ def _allowed(field: FieldInfo) -> str:
     if kind is float:
         return f"number{bounds}"
     if get_origin(kind) is tuple and Ellipsis not in options and options:
-        metadata = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
+        metadata: list[Any] = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
         return f"{len(options)} numbers{_bounds(metadata)}"
     if get_origin(kind) is tuple:
         return "list of tables"
@@ -167,10 +167,9 @@ def tables() -> dict[str, str]:
 
 def part_settings(slot: Slot[Any], kind: str) -> list[Setting]:
     """All settings of a part; of a law in the cascade only the law's own, for the cascade has a table to itself."""
-    fields = slot.registry[kind].Settings.model_fields
-    if {"law", "cascade"} <= set(fields):
-        return list(settings(fields["law"].annotation, "law."))
-    return list(settings(slot.registry[kind].Settings))
+    own = slot.registry[kind].Settings
+    law = _inner(own.model_fields["law"].annotation)[0] if {"law", "cascade"} <= set(own.model_fields) else None
+    return list(settings(own) if law is None else settings(law, "law."))
 
 
 def _presets_table(slot: Slot[Any]) -> str:
@@ -193,7 +192,7 @@ def _settings_table(rows: list[Setting]) -> str:
 
 
 def _scenario() -> Iterator[Setting]:
-    inside = {"start": Start, "mismatch": Mismatch}
+    inside: dict[str, type[BaseModel]] = {"start": Start, "mismatch": Mismatch}
     for name, field in scenario_fields().items():
         if name in inside:
             for setting in settings(inside[name], f"{name}."):
