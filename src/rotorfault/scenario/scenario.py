@@ -1,7 +1,7 @@
 """Scenarios: everything that defines a flight, as TOML or from Python, checked once.
 
 A scenario names parts by their ``kind`` (``[wind] kind = "constant"``); the other keys of such a table are the
-settings of that part. Built-in scenarios are in ``rotorfault/scenarios``; ``rotorfault new scenario`` writes a
+settings of that part. Built-in scenarios are in ``scenario/builtin``; ``rotorfault new scenario`` writes a
 commented one to start from.
 """
 
