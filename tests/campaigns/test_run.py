@@ -22,7 +22,7 @@ from rotorfault.base.executors import InProcess
 from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
-from rotorfault.campaigns.replay import identifier_of, replay
+from rotorfault.campaigns.replay import identifier_of
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
@@ -183,18 +183,6 @@ def test_identifiers_name_flights() -> None:
     assert identifier_of(study, "smc", 5, 3) == int(
         identifiers(study, FlightSet(*(np.array([x]) for x in (1, 5, 3))))[0]
     )
-
-
-def test_a_replay_is_the_flight_of_the_table() -> None:
-    study = tiny()
-    flights = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int)).part(slice(0, 72, 7))
-    table = fly_block(study, flights)
-    for row in table.to_pylist():
-        flight = replay(study, row["id"])
-        assert flight.outcome.kind == row["outcome"] or row["outcome"] in ("settled", "offset")
-        summary = flight.summary()
-        assert summary["cost"] == pytest.approx(row["cost"], rel=1e-12)
-        assert summary["tilt_max"] == pytest.approx(row["tilt_max"], rel=1e-12)
 
 
 # ------------------------------------------------------------------------------------------------------- refusals

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 from collections.abc import Callable
@@ -147,11 +146,4 @@ def test_a_damaged_study_is_found(old: str, new: str, folder: Path) -> None:
 def test_what_is_no_study_is_refused(content: str, folder: Path) -> None:
     (folder / "study.json").write_text(content)
     with pytest.raises(InputError, match=r"study\.json: is damaged or was not written by rotorfault"):
-        Store.open(folder)
-
-
-def test_a_later_format_says_which_version_to_use(folder: Path) -> None:
-    path = folder / "study.json"
-    path.write_text(json.dumps({"format": 2, "versions": {"rotorfault": "9.9"}}))
-    with pytest.raises(InputError, match=r"has format 2; this version reads up to 1; use rotorfault 9\.9"):
         Store.open(folder)
