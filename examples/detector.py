@@ -29,8 +29,8 @@ class ParityCheck(rf.Diagnoser[Memory, Numbers]):
     """Flags a rotor for good once its filtered loss of thrust exceeds a threshold."""
 
     class Settings(rf.Settings):
-        bandwidth: float = Field(8.0, gt=0.0, description="of the residual's filter [rad/s]")
-        threshold: float = Field(0.25, gt=0.0, lt=1.0, description="loss above which a rotor is flagged [-]")
+        bandwidth: float = Field(20.0, gt=0.0, description="of the residual's filter [rad/s]")
+        threshold: float = Field(0.2, gt=0.0, lt=1.0, description="loss above which a rotor is flagged [-]")
 
     Telemetry = Signals
 

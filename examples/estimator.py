@@ -18,14 +18,18 @@ class Memory(NamedTuple):
 
 
 class Signals(NamedTuple):
-    innovation: Annotated[rf.Vec3, rf.Quantity("m/s", "world: x forward, y left, z up", "velocity read less predicted")]
+    innovation: Annotated[
+        rf.Vec3, rf.Quantity("m/s", "world: x forward, y left, z up", "velocity read less predicted")
+    ]
 
 
 class VelocityFilter(rf.Estimator[Memory, Bandwidth]):
     """Velocity predicted from specific force and corrected by its reading; all else as read."""
 
     class Settings(rf.Settings):
-        bandwidth: float = Field(20.0, gt=0.0, description="of the correction; above it the accelerometer rules [rad/s]")
+        bandwidth: float = Field(
+            20.0, gt=0.0, description="of the correction; above it the accelerometer rules [rad/s]"
+        )
 
     Telemetry = Signals
 

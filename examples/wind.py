@@ -23,7 +23,9 @@ class GustFront(rf.Wind[rf.Nothing, Front]):
     """Still air, then a wind that rises smoothly and stays."""
 
     class Settings(rf.Settings):
-        velocity_W: tuple[float, float, float] = Field((5.0, 0.0, 0.0), description="velocity of the air at last [m/s]")
+        velocity_W: tuple[float, float, float] = Field(
+            (5.0, 0.0, 0.0), description="velocity of the air at last [m/s]"
+        )
         start: float = Field(0.5, ge=0.0, description="when it begins to rise [s]")
         rise: float = Field(1.0, gt=0.0, description="how long it rises [s]")
 

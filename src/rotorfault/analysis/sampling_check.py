@@ -1,7 +1,7 @@
 r"""Can a control law be flown at this sampling period and with these rotors? A cheap check of its gains, per axis.
 
 Laws are designed in continuous time for ideal actuators, :math:`\ddot e = u = -k_1 e - k_2\dot e`; they fly sampled,
-behind rotors that lag. For the gains that a controller reports (`ControlTelemetry`), hence for any controller, the
+behind rotors that lag. For the gains that a controller reports (signals ``gain_position`` and others), the
 nominal axis is therefore closed again through a zero-order hold and a first-order lag, exactly,
 
 .. math:: \frac{d}{dt}\begin{pmatrix} e\\ \dot e\\ a\end{pmatrix} =
