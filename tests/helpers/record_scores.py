@@ -89,6 +89,8 @@ def from_records(scenario: Scenario, signals: Mapping[str, Array], outcome: str)
     found["late_yaw_rms"] = np.sqrt((turn[late, 2] ** 2).sum() / count) if lasted else np.nan
     found["cost"] = cost(s, error, turn, air, dt)
     found |= detections(scenario, s, time, air)
+    begun = [onset for onset in found["onset"] if np.isfinite(onset)]
+    found["recovery_time"] = recovery(scenario, error, min(begun, default=np.nan), touched, outcome)
     for name, column in (
         ("outside_layer", "outside_layer_fraction"),
         ("riccati_guarded", "riccati_guarded_fraction"),
@@ -161,6 +163,15 @@ def detections(scenario: Scenario, s: Mapping[str, Array], time: Array, air: Arr
     if struck.any():
         lowest = s["position"][air, 2][struck].min()
     return columns | {"false_alarms": false, "lowest_after_loss": lowest}
+
+
+def recovery(scenario: Scenario, error: Array, first: float, touched: Array, outcome: str) -> float:
+    """Time from the first onset until the vehicle stays within 25 cm on each axis; of flights that went on flying."""
+    away = (np.abs(error) > 0.25).any(axis=1)
+    last = len(error) - 1 - int(np.argmax(away[::-1])) if away.any() else -1
+    if outcome in LOST or touched.any() or not np.isfinite(first) or last >= scenario.steps - 1:
+        return np.nan
+    return max((last + 1) * scenario.period - first, 0.0)
 
 
 def landing(scenario: Scenario, s: Mapping[str, Array], time: Array, touched: Array) -> list[float]:

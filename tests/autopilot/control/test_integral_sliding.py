@@ -68,7 +68,7 @@ def first_signals(controller: str, law: dict[str, Any]) -> Any:
     batch = assemble(scenario)
     drive = batch.loop.drive(scenario[REFERENCE].make().table(np.zeros(1)).at(0))
     signals: Any = batch.loop.step(batch.state, drive, batch.parameters)[1]
-    return signals.controller
+    return signals.parts.controller
 
 
 def test_there_are_laws_with_a_surface() -> None:
