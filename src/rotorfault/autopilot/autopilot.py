@@ -83,7 +83,8 @@ class Autopilot:
             Sampling period.
         """
         hover = hover_thrust(vehicle)
-        past = Past(rotors_at_hover(vehicle), (), Command(hover, zeros()), 0.0)
+        held = hover / vehicle.rotor_gain
+        past = Past(rotors_at_hover(vehicle), (), Command(held, zeros()), 0.0)
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
         wrench = Wrench(hover.sum(), zeros())
@@ -91,7 +92,7 @@ class Autopilot:
             "diagnosis": healthy(),
             "on_fault": Decision(reference, healthy()),
             "controller": ControlOutput(wrench),
-            "allocation": account(vehicle, wrench, healthy(), hover / vehicle.rotor_gain),
+            "allocation": account(vehicle, wrench, healthy(), held),
         }
         memories = []
         for slot, part in self.parts.items():
