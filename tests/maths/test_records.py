@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
-from rotorfault.maths.rotation import Quat
 from rotorfault.maths.records import flatten, leaf_names, select_record, unflatten
+from rotorfault.maths.rotation import Quat
 from rotorfault.model.signals import healthy
 
 

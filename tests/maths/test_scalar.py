@@ -48,6 +48,7 @@ EXPECTED: dict[str, Callable[..., float]] = {
     "is_finite": lambda x: float(math.isfinite(x)),
     "both": lambda a, b: float(a and b),
     "either": lambda a, b: float(a or b),
+    "any_of": lambda *conditions: float(any(conditions)),
     "negated": lambda a: 1.0 - a,
 }
 
@@ -100,9 +101,14 @@ def arguments(name: str) -> np.ndarray:
         return grid([x for x in NUMBERS if x != -3.5])  # of two that are equally near, either will do
     if name == "select":
         return grid([0.0, 1.0], NUMBERS, [7.0, -7.0])
-    if name in (*CONDITIONS_2, "negated"):
-        return grid(*[[0.0, 1.0]] * (1 if name == "negated" else 2))
+    if name in (*CONDITIONS_2, "negated", "any_of"):
+        return grid(*[[0.0, 1.0]] * {"negated": 1, "any_of": 3}.get(name, 2))
     return grid(*[NUMBERS] * (1 if name in (*ONE, "is_finite") else 2))
+
+
+def function(name: str) -> Callable[..., Any]:
+    """A function of the module, of as many arguments as it has scalars."""
+    return (lambda *conditions: scalar.any_of(conditions)) if name == "any_of" else getattr(scalar, name)
 
 
 def public_functions() -> set[str]:
@@ -122,7 +128,7 @@ def test_every_function_of_the_module_is_tested_here() -> None:
 def test_agrees_with_the_definition(engine: Callable[..., np.ndarray], name: str) -> None:
     rows = arguments(name)
     with np.errstate(invalid="ignore", divide="ignore"):
-        got = engine(getattr(scalar, name), rows)
+        got = engine(function(name), rows)
     want = np.array([EXPECTED[name](*map(float, row)) for row in rows])
     np.testing.assert_allclose(got, want, rtol=4e-15, atol=4e-15)
 
@@ -133,14 +139,14 @@ def test_nan_in_any_argument_comes_out(engine: Callable[..., np.ndarray], name: 
     count = arguments(name).shape[1]
     rows = np.full((count, count), 0.5)
     np.fill_diagonal(rows, NAN)
-    assert np.isnan(engine(getattr(scalar, name), rows)).all()
+    assert np.isnan(engine(function(name), rows)).all()
 
 
 @ENGINES
 @pytest.mark.parametrize("name", COMPARISONS)
 def test_comparison_with_nan_is_false(engine: Callable[..., np.ndarray], name: str) -> None:
     rows = np.array([[NAN, 1.0], [1.0, NAN], [NAN, NAN]])
-    assert (engine(getattr(scalar, name), rows) == 0.0).all()
+    assert (engine(function(name), rows) == 0.0).all()
 
 
 @ENGINES
@@ -166,6 +172,10 @@ def test_constants_mix_with_the_number_type_in_any_place(engine: Callable[..., n
         (lambda x: scalar.atan2(1.0, x), [math.atan2(1, -2), math.atan2(1, 0.5), math.atan2(1, 3)]),
     ):
         np.testing.assert_allclose(engine(function, rows), want, rtol=1e-15)
+
+
+def test_any_of_no_conditions_does_not_hold() -> None:
+    assert scalar.any_of(()) == 0.0
 
 
 def test_floats_never_raise_where_ieee_arithmetic_gives_nan_or_infinity() -> None:

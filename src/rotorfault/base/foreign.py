@@ -6,6 +6,7 @@ was made with code of one's own is known by the digest of its source (`source_di
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib
 import importlib.util
@@ -93,17 +94,26 @@ def _file_module(path: Path, what: str) -> ModuleType:
     path = path.resolve()
     if not path.is_file():
         raise InputError(f"{what}: no such file {path}; allowed: FILE.py:NAME")
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    source = path.read_bytes()
+    digest = hashlib.sha256(source).hexdigest()
     if path in _LOADED and _LOADED[path][0] == digest:
         return _LOADED[path][1]
     # A name of our own: a user's json.py must not stand in for the library's.
     name = f"rotorfault_foreign_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
     spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    if spec is None:
         raise InputError(f"{what}: {path} is no Python module")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
+    before, sys.modules[name] = sys.modules.get(name), module
+    try:
+        # The text that the digest is of, and not what Python keeps compiled: it takes a change within a second that
+        # leaves the length as it was for none.
+        exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
+    except BaseException:
+        del sys.modules[name]
+        if before is not None:
+            sys.modules[name] = before
+        raise
     _LOADED[path] = (digest, module)
     return module
 
@@ -127,8 +137,7 @@ def source_digest(thing: object) -> str:
     """
     part = thing if isinstance(thing, type) or inspect.isfunction(thing) else type(thing)
     digest = hashlib.sha256(f"{part.__module__}.{part.__qualname__}".encode())
-    module = sys.modules.get(part.__module__)
-    files = sorted({file for one in _reachable(module) for file in _files(one)}) if module is not None else []
+    files = sorted(set(_reachable(part.__module__)))
     for file in files:
         digest.update(hashlib.sha256(file.read_bytes()).digest())
     if not files:
@@ -141,31 +150,77 @@ def is_own(module: str) -> bool:
     return module == "rotorfault" or module.startswith("rotorfault.")
 
 
-def _reachable(start: ModuleType) -> Iterator[ModuleType]:
-    """A module and the user's modules that its names lead to, without those of installed packages."""
+def _reachable(start: str) -> Iterator[Path]:
+    """Files of a module and of the user's modules that it imports or whose objects it holds."""
     seen: set[str] = set()
     todo = [start]
     while todo:
-        module = todo.pop()
-        if module.__name__ in seen:
+        name = todo.pop()
+        if name in seen:
             continue
-        seen.add(module.__name__)
-        yield module
-        for value in list(vars(module).values()):
-            name = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-            other = sys.modules.get(name) if isinstance(name, str) else None
-            if other is not None and any(_files(other)):
-                todo.append(other)
+        seen.add(name)
+        file = _file(name, start.partition(".")[0])
+        if file is None:
+            continue
+        yield file
+        # What it imports may not be loaded yet, and of a number nobody can tell which module it is from; what it
+        # holds may have come in ways that no import statement shows.
+        todo += [*_imported(name, file), *_held(name)]
 
 
-def _files(module: ModuleType) -> Iterator[Path]:
-    """The module's file, if it is a user's: not of this package, the standard library or an installed package."""
-    file = getattr(module, "__file__", None)
-    if not file or is_own(module.__name__):
+def _file(name: str, home: str) -> Path | None:
+    """A module's file, if it is a user's: not of this package, the standard library or another installed package.
+
+    Parameters
+    ----------
+    name : str
+        Of the module, loaded or not.
+    home : str
+        The top-level package that the part is from; it counts as the user's where it is installed, too.
+    """
+    top = name.partition(".")[0]
+    if is_own(name) or (top != home and top in (*sys.stdlib_module_names, *sys.builtin_module_names)):
+        return None
+    module = sys.modules.get(name)
+    try:
+        # To look for a module in a package runs the package: not where it is none of the user's.
+        if module is None and "." in name and _file(name.rpartition(".")[0], home) is None:
+            return None
+        spec = importlib.util.find_spec(name) if module is None else None
+    except (ImportError, AttributeError, ValueError):
+        return None
+    origin = getattr(module, "__file__", None) or (spec.origin if spec is not None else None)
+    path = Path(origin) if origin else None
+    if path is None or not path.is_file():
+        return None
+    installed = top != home and any(path.is_relative_to(folder) for folder in _installed())
+    return None if installed else path
+
+
+def _imported(name: str, file: Path) -> Iterator[str]:
+    """Names of what a module's source imports, wherever in it; of ``from a import b`` both a and a.b."""
+    if file.suffix != ".py":
         return
-    path = Path(file)
-    if path.is_file() and not any(path.is_relative_to(folder) for folder in _installed()):
-        yield path
+    package = name if file.name == "__init__.py" else name.rpartition(".")[0]
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError):
+        return  # a file that is not loaded and could not be
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            base = ".".join(word for word in (above, node.module) if word)
+            yield from (base, *(f"{base}.{alias.name}" for alias in node.names))
+
+
+def _held(name: str) -> Iterator[str]:
+    """Names of the modules that a loaded module's objects are from."""
+    for value in list(vars(sys.modules[name]).values()) if name in sys.modules else ():
+        home = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+        if isinstance(home, str):
+            yield home
 
 
 @lru_cache(maxsize=1)

@@ -42,11 +42,17 @@ class Registry(Generic[B]):
         What its members are, in the singular, for messages: "controller", "wind", ...
     slot : str, optional
         Name of the slot, by which entry points name it; `sort` if not given.
+    accept : callable, optional
+        Makes a kind of part of what an entry point leads to, and raises InputError where it is none; gets the object
+        and words for it in a message. Not given: anything is taken as it is.
     """
 
-    def __init__(self, sort: str, slot: str | None = None) -> None:
+    def __init__(
+        self, sort: str, slot: str | None = None, accept: Callable[[object, str], Kind[B]] | None = None
+    ) -> None:
         self.sort = sort
         self._slot = sort if slot is None else slot
+        self._accept = accept
         self._members: dict[str, Kind[B]] = {}
 
     def add(self, name: str, kind: Kind[B]) -> None:
@@ -84,12 +90,15 @@ class Registry(Generic[B]):
         ------
         InputError
             If there is no such name (the message lists those that exist and the nearest one), or an entry point
-            cannot be loaded.
+            cannot be loaded or leads to no part of this kind.
         """
         if name in self._members:
             return self._members[name]
         if name in _outside(self._slot):
-            self._members[name] = cast("Kind[B]", _loaded(_outside(self._slot)[name]))
+            point = _outside(self._slot)[name]
+            part = _loaded(point)
+            where = f"entry point {point.name} = {point.value}"
+            self._members[name] = cast("Kind[B]", part) if self._accept is None else self._accept(part, where)
             return self._members[name]
         raise InputError(unknown(self.sort, name, list(self)))
 
@@ -106,9 +115,9 @@ def _entry_points() -> dict[str, metadata.EntryPoint]:
     return {point.name: point for point in metadata.entry_points(group=ENTRY_POINTS)}
 
 
-def _loaded(point: metadata.EntryPoint) -> Callable[..., Any]:
+def _loaded(point: metadata.EntryPoint) -> object:
     try:
-        part: Callable[..., Any] = point.load()
+        part: object = point.load()
     except Exception as error:
         raise InputError(
             f"entry point {point.name} = {point.value}: {type(error).__name__}: {' '.join(str(error).split())}; "

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.executors import executor_of
 from rotorfault.campaigns import run
-from rotorfault.campaigns.replay import replay
+from rotorfault.campaigns.replay import differences, replay
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
 from rotorfault.flight.flight import Flight
@@ -22,9 +24,20 @@ if TYPE_CHECKING:
 Say = Callable[[str], None]
 
 
+class ReplayWarning(UserWarning):
+    """A flight that was flown once more has other numbers than its row in the table."""
+
+
 @final
 class Campaign:
     """A campaign in its folder, complete or not.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Of the campaign.
+    allow_code : bool
+        Whether code that its study names may run, to replay flights.
 
     Attributes
     ----------
@@ -32,10 +45,10 @@ class Campaign:
     study : Study
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, *, allow_code: bool = False) -> None:
         self.folder = Path(folder)
         self._store = Store.open(self.folder)
-        self.study: Study = study_from(self._store.study, str(self.folder / "study.json"))
+        self.study: Study = study_from(self._store.study, str(self.folder / "study.json"), allow_code)
 
     def __repr__(self) -> str:
         return f"<campaign {self.study.name} in {self.folder}>"
@@ -58,8 +71,44 @@ class Campaign:
         return write(self.study, self.table(), self.folder, self._store.identity.versions)
 
     def replay(self, identifier: int) -> Flight:
-        """Fly one of the flights once more, with everything recorded: column ``id`` of the table names it."""
-        return replay(self.study, identifier)
+        """Fly one of the flights once more, with everything recorded.
+
+        Warns (`ReplayWarning`) where its numbers are not those of the table.
+
+        Parameters
+        ----------
+        identifier : int
+            Column ``id`` of the table.
+
+        Raises
+        ------
+        InputError
+            If there is no such flight, or it needs code that is not allowed.
+        """
+        flight = replay(self.study, identifier)
+        for line in self.differences(identifier, flight):
+            warnings.warn(line, ReplayWarning, stacklevel=2)
+        return flight
+
+    def differences(self, identifier: int, flight: Flight) -> list[str]:
+        """What of a replayed flight is not as in the table; empty where all agrees, or it was never flown.
+
+        Parameters
+        ----------
+        identifier : int
+            Column ``id`` of the table.
+        flight : Flight
+            Flown once more.
+        """
+        table = self.table()
+        rows = table.filter(pc.equal(table["id"], identifier)).to_pylist()
+        if not rows:
+            return []
+        lines = differences(rows[0], flight.scores)
+        there = self._store.identity.own
+        parts = [] if flight.scenario is None else [part for _, part in flight.scenario.parts()]
+        changed = [part.kind for part in parts if part.source != there.get(part.kind, "")]
+        return [*(f"source of {place} has changed since the campaign was flown" for place in changed), *lines]
 
 
 def campaign(
@@ -74,6 +123,7 @@ def campaign(
     budget: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    allow_code: bool = False,
     say: Say = lambda _: None,
 ) -> Campaign:
     """Fly a campaign.
@@ -94,6 +144,8 @@ def campaign(
         Threads; one per core if not given. Nothing in the table depends on it.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers fly.
+    allow_code : bool
+        Whether code that the study names may run.
     say : callable
         Is given, line by line, what was moved aside and the results of each round.
 
@@ -111,9 +163,9 @@ def campaign(
     if isinstance(study, Study):
         checked = study
     elif isinstance(study, (str, Path)):
-        checked = load_study(study)
+        checked = load_study(study, allow_code=allow_code)
     elif isinstance(study, Mapping):
-        checked = study_from(dict(study), "study")
+        checked = study_from(dict(study), "study", allow_code)
     else:
         raise InputError(f"study: got {study!r}; allowed: a name, a path, tables or a Study")
     checked = changed(checked, vehicle, preset, seed, budget).resolved()
@@ -126,4 +178,4 @@ def campaign(
         progress = run.fly(checked, store, executor, say)
     table = folder / "flights.parquet"
     say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")
-    return Campaign(folder)
+    return Campaign(folder, allow_code=checked.allows_code)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.flight_set import FlightSet, identifiers, seeds, values_of
-from rotorfault.campaigns.grades import RECOVERED, grades
+from rotorfault.campaigns.grades import grades
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.many import fly_many
+from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import ScoreTable
 
 METRICS = (
@@ -54,8 +55,8 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         which = np.flatnonzero(flights.variant == variant)
         scenario = study.scenarios[variant]
         varied = {key: column[which] for key, column in settings.items()}
-        parts.append((which, fly_many(scenario, varied, within=RECOVERED, threads=threads).table))
-        heights[which] = scenario.reference.make().table(np.zeros(1)).p_W[0, 2]
+        parts.append((which, fly_many(scenario, varied, threads=threads).table))
+        heights[which] = scenario[REFERENCE].make().table(np.zeros(1)).p_W[0, 2]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
     grade = grades(table)
@@ -71,20 +72,16 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         "success": np.isin(grade, study.success),
         "survived": table["survived"],
         "outcome": table["outcome"],
-        "recovery_time": recovery_times(table),
+        "recovery_time": table["recovery_time"],
         "altitude_lost": altitudes_lost(table, heights),
-        **{name.replace(".", "_"): table[name] for name in METRICS},
+        **{name.replace(".", "_"): _metric(table, name) for name in METRICS},
     }
     return pa.table({name: _column(values) for name, values in rows.items()})
 
 
-def recovery_times(table: ScoreTable) -> NDArray[np.float64]:
-    """Time in s from the first true loss until the error stays within `RECOVERED`; NaN where it never does."""
-    onsets = np.stack([table[f"onset.{rotor}"] for rotor in "1234"])
-    first = np.where(np.isnan(onsets), np.inf, onsets).min(axis=0)
-    settled = table["settle_time.overall"]
-    with np.errstate(invalid="ignore"):
-        return np.where(table["survived"] & np.isfinite(first), np.maximum(settled - first, 0.0), np.nan)
+def _metric(table: ScoreTable, name: str) -> NDArray[Any]:
+    """A column of the scores; NaN for controllers that have no such number."""
+    return table[name] if name in table else np.full(len(table), np.nan)
 
 
 def altitudes_lost(table: ScoreTable, height: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -33,8 +33,6 @@ HELD = 0.5  # m
 BOUNDED = 2.0  # m
 # Our choice: what a camera with a field of view of 60 degrees points at stays in view.
 YAW = 0.5  # rad
-# Our choice: half of HELD, so that who has recovered is not on the verge of being degraded.
-RECOVERED = 0.25  # m: within it a vehicle counts as back where it should be
 DESCENT = 3.0  # m/s, as after a fall from 0.5 m
 UPRIGHT = np.radians(30.0)  # our choice: it comes down on its undercarriage, not on a rotor
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.axes import columns
+from rotorfault.campaigns.block import METRICS
 from rotorfault.campaigns.flight_set import FlightSet, flight_of, seeds, values_of
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly
+
+AGREE = 1e-9  # relative: what a number may differ by on another processor
 
 
 def settings_of(study: Study, flight: FlightSet) -> dict[str, Any]:
@@ -34,6 +40,33 @@ def replay(study: Study, identifier: int) -> Flight:
     """
     flight = flight_of(study, identifier)
     return fly(study.scenarios[int(flight.variant[0])], settings=settings_of(study, flight))
+
+
+def differences(row: Mapping[str, Any], scores: Mapping[str, Any]) -> list[str]:
+    """Numbers of a flight that are not those of its row in a campaign's table, a line each.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the table.
+    scores : mapping
+        Of the flight that was flown once more.
+    """
+    lines = []
+    for name in ("outcome", "survived", *METRICS):
+        there, here = row.get(name.replace(".", "_")), scores.get(name)
+        if not _same(there, here):
+            lines.append(f"{name} is {here!r} here and {there!r} in the table")
+    return lines
+
+
+def _same(there: Any, here: Any) -> bool:
+    numbers = [float("nan") if value is None else value for value in (there, here)]
+    if all(isinstance(value, (int, float)) for value in numbers):
+        first, second = numbers
+        # Another processor may round otherwise; a row that differs by more is of another flight.
+        return bool(np.isclose(first, second, rtol=AGREE, atol=0.0, equal_nan=True))
+    return bool(there == here)
 
 
 def identifier_of(study: Study, label: str, cell: int, number: int) -> int:

@@ -28,6 +28,11 @@ from rotorfault.flight.assembly import assemble_group
 from rotorfault.flight.sweep import checked_columns, groups_of
 
 BYTES_PER_FLIGHT = 400
+ROOMS = (
+    "campaigns/sampling", "campaigns/axes.py", "campaigns/block.py", "campaigns/flight_set.py", "campaigns/grades.py",
+    "campaigns/rounds.py", "campaigns/study.py",
+)  # fmt: skip
+"""Of the campaigns' source, what decides which flights there are and what their rows say."""
 Say = Callable[[str], None]
 
 
@@ -48,10 +53,10 @@ def open_store(study: Study, folder: Path, resume: bool, repair: bool = False) -
     InputError
         See `rotorfault.campaigns.store.store.Store`.
     """
-    tables, digest = study.as_tables(), source_digest()
+    tables, digest, own = study.as_tables(), source_digest(*ROOMS), study.own_sources
     if resume or repair:
-        return Store.open(folder, study=tables, digest=digest, write=True, repair=repair)
-    return Store.create(folder, tables, digest, space=int(study.most_flights * BYTES_PER_FLIGHT))
+        return Store.open(folder, study=tables, digest=digest, own=own, write=True, repair=repair)
+    return Store.create(folder, tables, digest, space=int(study.most_flights * BYTES_PER_FLIGHT), own=own)
 
 
 def check(study: Study) -> None:

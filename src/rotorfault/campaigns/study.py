@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
@@ -25,7 +25,7 @@ from rotorfault.campaigns.grades import GRADES, SUCCESS
 from rotorfault.campaigns.sampling.refine import Refinement
 from rotorfault.campaigns.studies import FOLDER, study_names
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.library import is_file, load_scenario
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.scenario import Scenario, scenario_from
 
@@ -130,6 +130,8 @@ class Study(Strict):
     refine: Refinement = Field(default=Refinement(), description="how many flights a cell gets")
     success: tuple[str, ...] = Field(default=SUCCESS, min_length=1, description="grades that count as success")
 
+    _allow_code: bool = PrivateAttr(default=False)  # whether code that it names may run
+
     @field_validator("success")
     @classmethod
     def _grades(cls, value: tuple[str, ...]) -> tuple[str, ...]:
@@ -160,6 +162,11 @@ class Study(Strict):
                 f"{self.refine.initial} flights in each of {self.cells} cells for each variant",
             )  # fmt: skip
         return self
+
+    @property
+    def allows_code(self) -> bool:
+        """Whether code that it names may run."""
+        return self._allow_code
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -199,13 +206,20 @@ class Study(Strict):
         tables = self.as_tables()
         if isinstance(self.scenario, str):
             try:
-                tables["scenario"] = load_scenario(self.scenario).as_tables()
+                scenario = load_scenario(self.scenario, allow_code=self._allow_code)
+                tables["scenario"] = scenario.as_tables()
             except InputError as error:
                 raise InputError(f"study '{self.name}': {error}") from None
         for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
             if str(settings.get("vehicle", "")).endswith(".toml"):
                 settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
-        return study_from(tables, self.name)
+        return study_from(tables, self.name, self._allow_code)
+
+    @property
+    def own_sources(self) -> dict[str, str]:
+        """Digest of the source of each part from outside the package, by its place in code."""
+        parts = (part for scenario in self.scenarios for _, part in scenario.parts())
+        return {part.kind: part.source for part in parts if part.source}
 
     @property
     def scenario_name(self) -> str:
@@ -237,14 +251,14 @@ class Study(Strict):
 
     def _scenario(self, settings: dict[str, Any]) -> Scenario:
         if isinstance(self.scenario, str):
-            return load_scenario(self.scenario, settings)
+            return load_scenario(self.scenario, settings, allow_code=self._allow_code)
         tables = copy.deepcopy(self.scenario)
         override_all(tables, settings)
-        return scenario_from(tables, str(tables.get("name", "scenario")))
+        return scenario_from(tables, str(tables.get("name", "scenario")), self._allow_code)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Goes to other processes as plain data: scenarios hold registered parts, which cannot be pickled.
-        return study_from, (self.as_tables(), self.name)
+        return study_from, (self.as_tables(), self.name, self._allow_code)
 
 
 def _require_axis(name: str) -> None:
@@ -254,7 +268,7 @@ def _require_axis(name: str) -> None:
         raise refusal("name", str(error)) from None
 
 
-def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) -> Study:
+def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None, *, allow_code: bool = False) -> Study:
     """Load and check a study.
 
     Parameters
@@ -263,6 +277,8 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) 
         Name of a built-in study, or a path that ends in ``.toml``.
     changes : dict, optional
         Top-level keys to be replaced.
+    allow_code : bool
+        Whether code that the study names may run.
 
     Raises
     ------
@@ -278,9 +294,21 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None) 
         where = f"{name}.toml"
         text = (resources.files(FOLDER) / where).read_text(encoding="utf-8")
     tables = parse_toml(text, where) | (changes or {})
-    if str(name_or_path).endswith(".toml") and str(tables.get("scenario", "")).endswith(".toml"):
-        tables["scenario"] = str(Path(name_or_path).parent / tables["scenario"])
-    return study_from(tables, where)
+    if str(name_or_path).endswith(".toml"):
+        _relative_to(Path(name_or_path).parent, tables)
+    return study_from(tables, where, allow_code)
+
+
+def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
+    """Make the paths in a study file relative to the file."""
+    if str(tables.get("scenario", "")).endswith(".toml"):
+        tables["scenario"] = str(folder / tables["scenario"])
+    variants = tables.get("variant", [])
+    for owner in [tables, *(variants if isinstance(variants, list) else [])]:
+        settings: Any = owner.get("settings") if isinstance(owner, dict) else None
+        for key, value in settings.items() if isinstance(settings, dict) else ():
+            if is_file(value) or (key == "vehicle" and str(value).endswith(".toml")):
+                settings[key] = str(folder / value)
 
 
 def changed(
@@ -306,9 +334,26 @@ def changed(
         tables["seed"] = seed
     if budget is not None:
         tables["refine"]["budget"] = budget
-    return study_from(tables, study.name)
+    return study_from(tables, study.name, study.allows_code)
 
 
-def study_from(tables: dict[str, Any], where: str) -> Study:
-    """Check a study given as tables; `where` names their origin in messages."""
-    return validate(Study, tables, where)
+def study_from(tables: dict[str, Any], where: str, allow_code: bool = False) -> Study:
+    """Check a study given as tables.
+
+    Parameters
+    ----------
+    tables : dict
+        As a study file holds them.
+    where : str
+        Their origin, for messages.
+    allow_code : bool
+        Whether code that the study names may run.
+
+    Raises
+    ------
+    InputError
+        If anything is not right.
+    """
+    study = validate(Study, tables, where)
+    study._allow_code = allow_code
+    return study

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -101,12 +102,23 @@ def replay(
     if (flight is None) == (cell is None):
         raise InputError("give the flight by --flight ID, or by --cell and --variant")
     if flight is None:
+        assert cell is not None
         if variant is None:
             raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
         flight = identifier_of(study, variant, cell, number)
     target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
     output_folder(target)
-    finish(campaign.replay(flight), target, figures)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # told below, in lines of their own
+        flown = campaign.replay(flight)
+    finish(flown, target, figures)
+    differences = campaign.differences(flight, flown)
+    for line in differences:
+        typer.echo(f"warning: {line}", err=True)
+    if differences:
+        typer.echo("warning: this is not the flight of the table; its numbers are above", err=True)
+    else:
+        typer.echo("its numbers are those of the campaign's table")
 
 
 def _report(campaign: Campaign) -> None:

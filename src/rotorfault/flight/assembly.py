@@ -17,7 +17,7 @@ from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
 from rotorfault.engine.batch import Array, Batch, columns
 from rotorfault.engine.noise import Stream, normals
-from rotorfault.engine.structure import structure
+from rotorfault.engine.program import same_code
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
 from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.geometry import Vec3
@@ -81,6 +81,22 @@ def assemble_group(group: Group, part: slice = slice(None), own: Own | None = No
     return _Assembly(group, part, own or {}).batch()
 
 
+def numbers_of(group: Group) -> tuple[ClosedLoop, LoopParameters]:
+    """The loop of a group and the numbers of its flights, for those who ask parts and fly nothing.
+
+    Parameters
+    ----------
+    group : Group
+
+    Raises
+    ------
+    InputError
+        If a value is not allowed; names the flight.
+    """
+    loop = build(group.scenario)
+    return loop, _Assembly(group, slice(None), {}).parameters(loop)
+
+
 def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     """One batch of several flights that differ in numbers only: vehicle, start, wind, faults, gains, seed.
 
@@ -99,7 +115,7 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     batches = [assemble(scenario) for scenario in scenarios]
     first = batches[0]
     for batch, scenario in zip(batches[1:], scenarios[1:], strict=True):
-        same = structure(batch.loop) == structure(first.loop) and batch.every == first.every
+        same = same_code(first, batch) and batch.every == first.every
         if not same or not np.array_equal(batch.reference, first.reference):
             raise InputError(
                 f"scenario '{scenario.name}' differs from the first in more than numbers (parts, options, length or "
@@ -232,18 +248,22 @@ class _Assembly:
         self._objects: dict[str, tuple[list[Any], NDArray[np.intp]]] = {}
         self._tables = self.scenario.as_tables() if self.columns else {}
 
+    def parameters(self, loop: ClosedLoop) -> LoopParameters:
+        """Numbers of the flights, without those of scoring."""
+        return LoopParameters(
+            vehicle=self.numbers(("vehicle", "mismatch"), lambda v, m: m.applied(v.vehicle)),
+            belief=self.numbers(("vehicle",), lambda v: v.vehicle),
+            parts=loop.record(*(self._part_numbers(slot) for slot in loop.parts)),
+            period=self.scenario.period,
+        )
+
     def batch(self) -> Batch:
         """Loop, state, numbers and reference of the flights."""
         scenario, source = self.scenario, source_of(self.scenario, self.own)
         loop = ClosedLoop(parts_of(scenario, self.own), scenario.substeps, source.Telemetry)
         reference = reference_of(scenario, source)
-        believed = self.numbers(("vehicle",), lambda v: v.vehicle)
-        parameters = LoopParameters(
-            vehicle=self.numbers(("vehicle", "mismatch"), lambda v, m: m.applied(v.vehicle)),
-            belief=believed,
-            parts=loop.record(*(self._part_numbers(slot) for slot in loop.parts)),
-            period=scenario.period,
-        )
+        parameters = self.parameters(loop)
+        believed = parameters.belief
         start = self.numbers(("start",), lambda s: start_of(scenario.model_copy(update={"start": s})))
         position = np.stack([np.broadcast_to(x, (self.count,)) for x in start.p_W], axis=-1)
         ground = loop.maybe(GROUND)

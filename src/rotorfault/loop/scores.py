@@ -24,6 +24,9 @@ SLIDE_MAX = 0.5  # m/s, horizontal
 TILT_MAX = math.radians(15.0)  # at touch-down; beyond it a vehicle of usual proportions tips over its feet
 REST = 0.5  # s that a landed vehicle must stand with rotors stopped; then the flight is over
 AT_LIMIT = 1e-9  # of the largest command: below it a difference from a limit is rounding
+# m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that has
+# recovered is not on the verge of being degraded.
+RECOVERED = 0.25
 READ_AFTER = 0.15  # s after an onset at which losses are read: six time constants of the believed loss
 COST_INPUT = "controller.virtual_position"
 
@@ -84,6 +87,7 @@ class Scores(NamedTuple):
     end: Scalar  # number of the step at which it was over
     seen: Scalar  # instants counted
     last_outside: Vec3  # number of the last step outside the settling band, -1 before any
+    last_away: Scalar  # number of the last step further than `RECOVERED` from the reference, -1 before any
     late_square: Vec3  # m^2: sum of squared errors over the last half
     late_yaw_square: Scalar  # rad^2: the same of yaw
     position_square: Vec3  # m^2: sum of squared errors

@@ -12,6 +12,7 @@ and a flight has one set of numbers whatever of it is recorded and how finely.
   *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is ``interrupted``.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
+- *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.
 - *Attitude error*: rotation vector from the attitude that is level at the reference's yaw to the true one, in rad
   about body x, y, z; to first order these are roll, pitch and yaw error, and there is no angle at which it fails.
 - *Cost*: J = 1/2 int (e'Qe + u'Ru) dt with the printed weights (35), \|e\| floored at 0.01 m in both, e against the
@@ -37,6 +38,7 @@ from rotorfault.loop.scores import (
     COST_INPUT,
     FAR,
     READ_AFTER,
+    RECOVERED,
     REST,
     SLIDE_MAX,
     SPEED_MAX,
@@ -100,7 +102,7 @@ class Scoring:
         none, never = zeros(), Vec3(-1.0, -1.0, -1.0)
         landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0) if self.lands else ()
         return Scores(
-            over=0.0, end=0.0, seen=0.0, last_outside=never, late_square=none, late_yaw_square=0.0,
+            over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,
             position_square=none, attitude_square=none, position_error=none, attitude=Quat.identity(), velocity=none,
             cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, lowest_after=FAR, variation=0.0,
             command=PerRotor.all(0.0), saturated=0.0, given_up=none, flags=PerRotor.all(0.0), false_alarms=0.0,
@@ -238,6 +240,7 @@ class Scoring:
                 lambda old, e, band: select(less_equal(absolute(e), band), old, step),
                 scores.last_outside, error, parameters.settle_band,
             ),
+            last_away=select(_inside(error, RECOVERED), scores.last_away, step),
             late_square=each(lambda old, e: select(late, old + e, old), scores.late_square, square),
             late_yaw_square=select(late, scores.late_yaw_square + turn.z * turn.z, scores.late_yaw_square),
             position_square=scores.position_square + square,
@@ -291,7 +294,7 @@ class Scoring:
     @staticmethod
     def _signal(signal: Signal, old: Scalar, signals: Any, first: Scalar) -> Scalar:
         """What is counted of one signal after this instant."""
-        value = signals
+        value = signals.parts if "." in signal.name else signals
         for name in signal.name.split("."):
             value = getattr(value, name)
         leaves = flatten(value)
@@ -336,6 +339,12 @@ def _true_state_is_finite(signals: Any) -> Scalar:
     for row in rows[1:]:
         total = total + row  # infinite or NaN where any is
     return is_finite(total)
+
+
+def _inside(v: Vec3, limit: float) -> Scalar:
+    """1 where every component is within a limit, which counts as inside."""
+    x, y, z = (less_equal(absolute(component), limit) for component in v)
+    return both(both(x, y), z)
 
 
 def _within(v: Vec3, limit: float) -> Scalar:

@@ -20,6 +20,12 @@ class Quat(Value):
     def __init__(self, w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> None:
         self.w, self.x, self.y, self.z = w, x, y, z
 
+    def __eq__(self, other: object) -> bool:
+        # Whether it still knows its angles (`OfAngles`) makes no other quaternion of it.
+        return isinstance(other, Quat) and all(a == b for a, b in zip(self, other, strict=True))
+
+    __hash__ = None
+
     @classmethod
     def identity(cls) -> Quat:
         """The zero rotation."""
@@ -109,7 +115,7 @@ class Quat(Value):
 
     @classmethod
     def small(cls, rotation: Vec3) -> Quat:
-        """The rotation by a small rotation vector in rad, exact to third order; of unit length."""
+        """The rotation by a small rotation vector in rad; of unit length, its angle short by a twelfth of the cube."""
         half = rotation * 0.5
         scale = 1.0 / sqrt(1.0 + half.dot(half))
         return cls(scale, half.x * scale, half.y * scale, half.z * scale)

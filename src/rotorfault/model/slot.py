@@ -8,7 +8,7 @@ A slot's name is its key in a scenario and the prefix of its parts' signals. Wha
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Generic, Literal, TypeVar, final
+from typing import Any, Final, Generic, Literal, TypeVar, cast, final
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.registry import Kind, Registry
@@ -89,8 +89,32 @@ class Slot(Generic[B]):
         self.presets: Final = presets
         self.inputs: Final = inputs
         self.adapt: Callable[[object], Kind[B] | None] | None = None  # makes a kind of what is none by itself
-        self.registry: Final[Registry[B]] = Registry(sort or name, name)
+        self.registry: Final[Registry[B]] = Registry(sort or name, name, self.kind_of)
         base.slot = self  # type: ignore[attr-defined]
+
+    def kind_of(self, part: object, where: str) -> Kind[B]:
+        """What code from outside the package gives, as a kind of part of this slot.
+
+        Parameters
+        ----------
+        part : object
+            A class of parts, or what can be adapted to one.
+        where : str
+            Where it is from, for the message.
+
+        Raises
+        ------
+        InputError
+            If it is neither.
+        """
+        if self.adapt is not None and (adapted := self.adapt(part)) is not None:
+            return adapted
+        home = slot_of(part)
+        if home is not self or not callable(part):
+            raise InputError(
+                f"{where} is a {home.registry.sort}; allowed: a class that derives from rotorfault.{self.base.__name__}"
+            )
+        return cast("Kind[B]", part)
 
     def __repr__(self) -> str:
         return f"<slot {self.name}: {', '.join(self.registry)}>"

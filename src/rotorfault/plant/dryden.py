@@ -180,6 +180,10 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
         )
         return after, self.at(inputs.time, after, parameters), Nothing()
 
+    def mean_velocity(self, parameters: DrydenParameters) -> Vec3:
+        """That of the wind which carries the gusts."""
+        return parameters.velocity_W
+
     def at(self, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Air:
         """Mean wind plus gust."""
         p, gust = parameters, memory.gust

@@ -34,6 +34,10 @@ class Wind(Timed[Air, MemoryT, ParametersT]):
     A wind without memory has no rows in the state of a flight and costs no operation.
     """
 
+    def mean_velocity(self, parameters: ParametersT) -> Vec3 | None:
+        """Mean velocity of the air in m/s, for winds that push by nothing else on average; None for others."""
+        return None
+
 
 WIND = Slot("wind", Wind, "truth", "what the air does", "winds", default="none", streams=(1, 2), calm="none")
 
@@ -42,6 +46,10 @@ WIND = Slot("wind", Wind, "truth", "what the air does", "winds", default="none",
 @register("none")
 class NoWind(Wind[Nothing, Nothing]):
     """Still air: no wind and no disturbance."""
+
+    def mean_velocity(self, parameters: Nothing) -> Vec3:
+        """None."""
+        return zeros()
 
     def at(self, time: Scalar, memory: Nothing, parameters: Nothing) -> Air:
         """Air at rest."""
@@ -69,6 +77,10 @@ class ConstantWind(Wind[Nothing, ConstantWindParameters]):
     def parameters(self, context: Context) -> ConstantWindParameters:
         """The wind velocity."""
         return ConstantWindParameters(Vec3.of(self.settings.velocity_W))
+
+    def mean_velocity(self, parameters: ConstantWindParameters) -> Vec3:
+        """The wind velocity."""
+        return parameters.velocity_W
 
     def at(self, time: Scalar, memory: Nothing, parameters: ConstantWindParameters) -> Air:
         """The same at all times."""

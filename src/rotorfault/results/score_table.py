@@ -5,7 +5,7 @@ flight, detections of rotors that no fault hits, landings that were not begun. C
 angle or rotor:
 
 - ``outcome``, ``survived``, ``end_time`` [s];
-- ``settle_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m], ``velocity_end`` [m/s], by axis;
+- ``settle_time`` and ``recovery_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m], ``velocity_end`` [m/s], by axis;
 - ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``, ``tilt_end``
   [rad];
 - ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
@@ -131,6 +131,7 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table["saturated_fraction"] = scores.saturated * share
         table |= _named("given_up_fraction", GIVEN_UP, [x * share for x in scores.given_up])
         table |= _detections(scoring, scores, onsets, end_time)
+        table["recovery_time"] = _recovery(table, scores, batch.steps, dt)
         table["false_alarms"] = scores.false_alarms.astype(int)
         if scoring.lands:
             table |= _landing(scores, onsets, end_time)
@@ -181,6 +182,15 @@ def _detections(scoring: Scoring, scores: Scores, onsets: Sequence[Any], end_tim
         table[f"loss_believed.{rotor}"] = np.where(read, detection.loss_believed, np.nan)
         table[f"loss_error.{rotor}"] = np.where(read, detection.loss_error, np.nan)
     return table
+
+
+def _recovery(table: Columns, scores: Scores, steps: int, dt: NDArray[Any]) -> NDArray[Any]:
+    """Time in s from the first onset until the vehicle is back for good; NaN where it never is, or nothing began."""
+    onsets = np.stack([table[f"onset.{rotor}"] for rotor in ROTORS])
+    first = np.where(np.isnan(onsets), np.inf, onsets).min(axis=0)
+    back = np.where(scores.last_away >= steps - 1, np.nan, (scores.last_away + 1.0) * dt)
+    flew = table["survived"] & (scores.touched == 0.0) & np.isfinite(first)
+    return np.where(flew, np.maximum(back - first, 0.0), np.nan)
 
 
 def _landing(scores: Scores, onsets: Sequence[Any], end_time: NDArray[Any]) -> Columns:

@@ -49,6 +49,8 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
                 f"(true {hit['loss_true']:.3g})"
             )
         found.append((f"fault of rotor {hit['rotor']} at {hit['true_time']:g} s", text))
+    if summary["detections"] and summary.get("landing") is None:
+        found.append(("back within 0.25 m after", number(summary["recovery_time"], "s")))
     if summary.get("landing") is not None:
         found += landing_rows(summary["landing"])
     found.append(("false alarms", str(summary["false_alarms"])))

@@ -65,13 +65,14 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
     for slot in SLOTS:
         part = tables.get(slot.name)
         for table in part if isinstance(part, list) else [part]:
-            if isinstance(table, dict) and _is_file(table.get("kind")):
+            if isinstance(table, dict) and is_file(table.get("kind")):
                 table["kind"] = str(folder / table["kind"])
-        if _is_file(part):
+        if is_file(part):
             tables[slot.name] = str(folder / str(part))
 
 
-def _is_file(kind: object) -> bool:
+def is_file(kind: object) -> bool:
+    """Whether a part is named by a place in a file, ``FILE.py:NAME``."""
     return isinstance(kind, str) and is_place(kind) and kind.rpartition(":")[0].endswith(".py")
 
 

@@ -13,7 +13,7 @@ from rotorfault.base import foreign
 from rotorfault.base.config import Strict, passed_on, refusal
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.registry import Kind
-from rotorfault.model.slot import Slot, slot_of
+from rotorfault.model.slot import Slot
 
 B = TypeVar("B")
 DEFAULT_PRESET = "tuned"
@@ -153,16 +153,7 @@ def part_from(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) 
 
 def _foreign(slot: Slot[B], place: str, allow: bool | Collection[str]) -> Kind[B]:
     foreign.require_allowed(place, allow, slot.registry.sort)
-    part = foreign.load(place, slot.registry.sort)
-    if slot.adapt is not None and (adapted := slot.adapt(part)) is not None:
-        return adapted
-    home = slot_of(part)
-    if home is not slot or not callable(part):
-        raise InputError(
-            f"{slot.registry.sort} '{place}' is a {home.registry.sort}; allowed: a class that derives from "
-            f"rotorfault.{slot.base.__name__}"
-        )
-    return cast("Kind[B]", part)
+    return slot.kind_of(foreign.load(place, slot.registry.sort), f"{slot.registry.sort} '{place}'")
 
 
 def _with_preset(

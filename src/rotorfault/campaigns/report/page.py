@@ -23,6 +23,7 @@ from rotorfault.campaigns.report.curves import slices
 from rotorfault.campaigns.report.maps import Maps
 from rotorfault.campaigns.sampling.paired import Difference
 from rotorfault.campaigns.sampling.statistics import Array
+from rotorfault.loop.scores import RECOVERED
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 MEANINGS = {
@@ -67,7 +68,7 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         seeds=f"{maps.study.seed}; a flight's draws and seed follow from it, its cell and its number within the cell",
         versions=versions,
         meanings=MEANINGS,
-        recovered=f"{grades.RECOVERED:g}",
+        recovered=f"{RECOVERED:g}",
         axes=[_axis(maps, k) for k in range(len(maps.views))],
         totals=[_total(maps, k) for k in range(len(maps.variants))],
         differences=[

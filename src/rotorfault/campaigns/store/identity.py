@@ -12,7 +12,7 @@ import pyarrow as pa
 from rotorfault.base.errors import InputError
 from rotorfault.base.versions import versions
 
-FORMAT = 1  # of the folder
+FORMAT = 2  # of the folder
 # Numbers of a flight may change with these. The other versions are kept for the record.
 _DECIDING = ("rotorfault", "numpy", "scipy", "llvmlite")
 _REMEDY = "restore it from a copy, or start the campaign anew with another --out"
@@ -24,6 +24,7 @@ class Identity(NamedTuple):
     study: dict[str, Any]
     program: str  # digest of the source that decides numbers
     versions: dict[str, str]
+    own: dict[str, str]  # digest of the source of each part from outside the package, by its place in code
 
     @property
     def study_digest(self) -> str:
@@ -33,16 +34,19 @@ class Identity(NamedTuple):
     @property
     def campaign(self) -> str:
         """SHA-256 of all that decides numbers; every part bears it."""
-        return _digest([FORMAT, self.study, self.program, {name: self.versions.get(name) for name in _DECIDING}])
+        deciding = {name: self.versions.get(name) for name in _DECIDING}
+        return _digest([FORMAT, self.study, self.program, deciding, self.own])
 
     def encoded(self) -> bytes:
         """Content of ``study.json``."""
-        content = {"format": FORMAT, "study": self.study, "versions": self.versions}
+        content = {"format": FORMAT, "study": self.study, "versions": self.versions, "own_parts": self.own}
         digests = {"study": self.study_digest, "program": self.program, "campaign": self.campaign}
         content["digests"] = {**digests, "file": _digest([content, digests])}
         return (json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
-    def unlike(self, study: dict[str, Any] | None, program: str | None) -> str | None:
+    def unlike(
+        self, study: dict[str, Any] | None, program: str | None, own: dict[str, str] | None = None
+    ) -> str | None:
         """Why this campaign, as it is kept, is not that of a study and a program here; None if it is.
 
         Parameters
@@ -50,6 +54,8 @@ class Identity(NamedTuple):
         study : dict or None
         program : str or None
             Not compared where None.
+        own : dict, optional
+            Digests of the parts from outside the package; compared with the program.
         """
         if study is not None and (difference := _first_difference(self.study, _plain(study))):
             return f"holds a campaign of another study ({difference}); give another --out"
@@ -66,18 +72,33 @@ class Identity(NamedTuple):
                 f"was flown by other source of rotorfault {here['rotorfault']} (digest {self.program[:12]}, here "
                 f"{program[:12]}); give another --out, or --resume with that source"
             )
+        other = sorted(place for place in {*self.own, *(own or {})} if self.own.get(place) != (own or {}).get(place))
+        if other:
+            return (
+                f"was flown with other source of {', '.join(other)}; resumed, its table would mix two programs: give "
+                "another --out, or restore that source"
+            )
         return None
 
 
-def identity(study: dict[str, Any], program: str) -> Identity:
+def identity(study: dict[str, Any], program: str, own: dict[str, str] | None = None) -> Identity:
     """Of a study flown here and now.
+
+    Parameters
+    ----------
+    study : dict
+        Its tables.
+    program : str
+        Digest of the source that decides numbers.
+    own : dict, optional
+        Digest of the source of each part from outside the package, by its place in code.
 
     Raises
     ------
     TypeError, ValueError
         If the study is not plain data.
     """
-    return Identity(_plain(study), program, _versions())
+    return Identity(_plain(study), program, _versions(), dict(own or {}))
 
 
 def read_identity(path: Path) -> Identity:
@@ -96,7 +117,15 @@ def read_identity(path: Path) -> Identity:
             raise InputError(
                 f"{path}: has format {file_format}; this version reads up to {FORMAT}; use rotorfault {version}"
             )
-        campaign = Identity(content["study"], content["digests"]["program"], content["versions"])
+        if isinstance(file_format, int) and file_format < FORMAT:
+            version = content["versions"]["rotorfault"]
+            raise InputError(
+                f"{path}: has format {file_format}, of rotorfault {version}, whose tables this version does not read; "
+                "fly the study anew, or use that version"
+            )
+        campaign = Identity(
+            content["study"], content["digests"]["program"], content["versions"], content["own_parts"]
+        )
         if json.loads(campaign.encoded()) != content:
             raise InputError(f"{path}: has changed since it was written; {_REMEDY}")
     except OSError as error:

@@ -77,7 +77,15 @@ class Store:
         self._schema: pa.Schema | None = None
 
     @classmethod
-    def create(cls, folder: Path, study: dict[str, Any], digest: str, *, space: int = 0) -> Store:
+    def create(
+        cls,
+        folder: Path,
+        study: dict[str, Any],
+        digest: str,
+        *,
+        space: int = 0,
+        own: dict[str, str] | None = None,
+    ) -> Store:
         """Start a campaign in a folder of its own, and hold it for writing.
 
         Parameters
@@ -90,6 +98,8 @@ class Store:
             Of the program's source that decides numbers, see `rotorfault.base.versions.source_digest`.
         space : int, optional
             Bytes that the results will take, as far as one can tell.
+        own : dict, optional
+            Digest of the source of each part from outside the package, by its place in code.
 
         Raises
         ------
@@ -97,7 +107,7 @@ class Store:
             If the folder holds a campaign or anything else, is a file, cannot be written, is being written by another
             process, or has less space.
         """
-        campaign = identity(study, digest)
+        campaign = identity(study, digest, own)
         require_vacant(folder, campaign)
         require_space(folder, space)
         try:
@@ -119,14 +129,14 @@ class Store:
     @classmethod
     def open(
         cls, folder: Path, *, study: dict[str, Any] | None = None, digest: str | None = None,
-        write: bool = False, repair: bool = False,
+        own: dict[str, str] | None = None, write: bool = False, repair: bool = False,
     ) -> Store:  # fmt: skip
         """Open a campaign: to read, also while another process writes it, or to resume it.
 
         Parameters
         ----------
         folder : Path
-        study, digest : dict, str, optional
+        study, digest, own : optional
             As for `create`; where given, the campaign must be of this study, and flown by this program.
         write : bool, optional
             Resume it: it is locked, all its parts are checked now, leftovers of a killed run are removed.
@@ -144,7 +154,7 @@ class Store:
         if not (folder / STUDY).is_file():
             raise InputError(f"{folder}: holds no campaign (no {STUDY}); give the folder of one")
         campaign = read_identity(folder / STUDY)
-        if difference := campaign.unlike(study, digest):
+        if difference := campaign.unlike(study, digest, own):
             raise InputError(f"{folder}: {difference}")
         if not (write or repair):
             return cls(folder, campaign, None)
