@@ -36,6 +36,9 @@ ENDS = ("flying", "diverged", "tumbled", "ground", "landed")
 SURVIVED = ("settled", "tracked", "offset", "landed")
 """Outcomes with which the vehicle is sound."""
 
+INTERRUPTED = "interrupted"
+"""Outcome of a flight that somebody ended before it was over."""
+
 
 class ScoringParameters(NamedTuple):
     """Numbers that scoring needs of a flight."""
