@@ -109,7 +109,10 @@ class Slot(Generic[B]):
         """
         if self.adapt is not None and (adapted := self.adapt(part)) is not None:
             return adapted
-        home = slot_of(part)
+        try:
+            home = slot_of(part)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
         if home is not self or not callable(part):
             raise InputError(
                 f"{where} is a {home.registry.sort}; allowed: a class that derives from rotorfault.{self.base.__name__}"
