@@ -145,7 +145,7 @@ def test_points_of_other_kinds_of_part_and_other_groups_are_nobodys_wind(bring: 
 @pytest.mark.parametrize(
     ("value", "reason"),
     {
-        "brought_nothing:Gust": "ModuleNotFoundError: No module named 'brought_nothing'; mend or uninstall the package",
+        "brought_nothing:Gust": "ModuleNotFoundError: No module named 'brought_nothing'; mend or uninstall the",
         "brought_gusts:Gist": "AttributeError: .*'Gist'; mend or uninstall",
         "brought_gusts:number": "int derives from no kind of part",
         "rotorfault.plant.sensors:Ideal": "is a sensors; allowed: a class that derives from rotorfault.Wind",
