@@ -235,3 +235,45 @@ def test_settings_may_differ_between_the_flights_of_a_batch() -> None:
     assert normal[0] == 0.0
     assert normal[1] == pytest.approx(WEIGHT)
     assert normal[2] > 100.0 * WEIGHT
+
+
+HARD = [
+    {}, {"sag": 1e-4}, {"foot_spread": 4.0}, {"damping": 20.0}, {"slip_speed": 0.01}, {"friction": 3.0},
+    {"sag": 1e-3, "foot_spread": 3.0, "damping": 8.0},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", HARD, ids=repr)
+def test_contact_is_stable_at_the_longest_step_of_any_gear(settings: dict[str, float]) -> None:
+    """A harder gear needs shorter steps: thrown down with a slide and a spin, it comes to rest, and does not ring."""
+    ground = part(GROUND, "level", **settings)
+    step = ground.longest_step()
+    plant = plant_of("rigid_body", ground=ground)
+    parameters = numbers_of(plant, HUMMINGBIRD)
+    held = held_by(plant, parameters)
+    start = (Vec3(0.0, 0.0, 0.02), Vec3(0.2, -0.1, 0.0), Vec3(0.06, -0.04, 0.3), Vec3(0.0, 0.0, 0.5))
+    state = plant.initial(*start, PerRotor.all(0.0), parameters)
+    for k in range(math.ceil(0.8 / step)):
+        state = plant.step(state, STILL, held, k * step, parameters, step)
+    end = truth_of(plant, state, 0.8, parameters)
+    assert end.ground_force == pytest.approx(WEIGHT, rel=1e-3)
+    assert end.state.omega_B.norm() < 1e-2
+
+
+def test_a_step_that_is_too_long_for_the_ground_is_refused() -> None:
+    def scenario(step: float, **ground: Any) -> Any:
+        tables = {
+            "name": "t",
+            "vehicle": "paper",
+            "duration": 1.0,
+            "period": 0.005,
+            "controller": "smc",
+            "step": step,
+        }
+        reference = {"kind": "set_point", "position": [0, 0, 1]}
+        return scenario_from({**tables, "reference": reference, "ground": {"kind": "level", **ground}}, "test")
+
+    assert scenario(0.005).substeps == 1
+    assert scenario(0.0025, sag=0.0005).substeps == 2
+    with pytest.raises(InputError, match=r"^test: step: got 0\.005 s; allowed with this ground: up to 0\.0025 s"):
+        scenario(0.005, sag=0.0005)
