@@ -134,6 +134,17 @@ def test_paper_wind_pushes_by_its_integral():
     np.testing.assert_allclose(array(truth.state.v_W), [push, -push, push], atol=1e-8)
 
 
+def test_a_mean_velocity_is_that_of_winds_that_push_by_nothing_else():
+    """Of the paper's disturbance there is none: it is an acceleration, whatever the vehicle's drag."""
+    velocity = (1.0, -2.0, 0.5)
+    given = {"none": {}, "constant": {"velocity_W": velocity}, "paper": {}, "dryden": {"velocity_W": velocity}}
+    expected = {"none": zeros(), "constant": Vec3(*velocity), "paper": None, "dryden": Vec3(*velocity)}
+    assert list(WIND.registry) == list(expected)
+    for name, settings in given.items():
+        air = wind(name, **settings)
+        assert air.mean_velocity(air.parameters(Context(VEHICLE, T))) == expected[name], name
+
+
 def test_commands_beyond_the_limits_are_limited():
     _, high = fly(plant_of(), VEHICLE, PerRotor.all(100.0), 1000, start=hover_thrust(VEHICLE))
     np.testing.assert_allclose(array(high.thrust), VEHICLE.thrust_max, rtol=1e-12)
