@@ -225,5 +225,13 @@ def scenario_fields() -> dict[str, Any]:
 
 
 def named_places(overrides: Mapping[str, Any]) -> frozenset[str]:
-    """Places of code that a user has named himself, among values in place of a scenario's."""
-    return frozenset(value for value in overrides.values() if isinstance(value, str) and is_place(value))
+    """Places of code that a user has named himself, among values in place of a scenario's, or in tables of them."""
+
+    def places(value: Any) -> Iterator[str]:
+        if isinstance(value, str) and is_place(value):
+            yield value
+        elif isinstance(value, (Mapping, list, tuple)):
+            for inner in value.values() if isinstance(value, Mapping) else value:
+                yield from places(inner)
+
+    return frozenset(places(overrides))
