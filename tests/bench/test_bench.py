@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -64,9 +65,23 @@ def test_bench_measures_everything_and_says_it(tmp_path: Path, monkeypatch: pyte
     assert 0.0 < saved["operations"]["share_of_peak"] < 1.0
     assert saved["operations"]["flops"] > 1000
     assert set(saved["latency"]) == {"simd", "python", "numpy"}
-    table = study.text(found)
-    assert "batch of 10,000" in table
-    assert max(map(len, table.splitlines())) < 240
+    rows = {cells[0]: cells[1:] for line in study.text(found).splitlines() if len(cells := re.split("  +", line)) > 2}
+    assert set(saved["batch"]) == {"9", "10000"}
+    for size, part in saved["batch"].items():
+        steps, simulated = rows[f"batch of {int(size):,}"][:2]
+        assert steps == f"{1e-6 * part['steps_per_s']:.2f} M"
+        assert number(simulated) == pytest.approx(part["simulated_s_per_s_per_core"], abs=0.51)
+    for engine, part in saved["latency"].items():
+        assert [number(cell) for cell in rows[engine]] == pytest.approx(
+            [part["median_us"], part["p99_9_us"]], abs=0.05
+        )
+    for name, solver in saved["sdre"]["sizes"]["12"]["solvers"].items():
+        if solver is not None:
+            assert number(rows[name][0]) == pytest.approx(solver["us"], abs=5.1e-4)
+
+
+def number(cell: str) -> float:
+    return float(cell.replace(",", ""))
 
 
 def test_peers_stand_in_the_table() -> None:

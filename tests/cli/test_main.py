@@ -2,13 +2,16 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer.main
+from typer.testing import CliRunner
 
 import rotorfault as rf
 from rotorfault.cli import main as cli
@@ -19,12 +22,45 @@ def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=300)
 
 
-@pytest.mark.parametrize("command", [(), ("fly",), ("compare",), ("list",), ("new",), ("check",), ("trim",)])
-def test_help_teaches(command: tuple[str, ...]) -> None:
-    done = run(*command, "--help")
+COMMANDS: dict[str, Any] = typer.main.get_command(cli.app).commands  # type: ignore[attr-defined]
+
+
+def test_help_names_every_command() -> None:
+    done = run("--help")
     assert done.returncode == 0
-    assert "Usage:" in done.stdout
-    assert len(done.stdout.splitlines()) > 6
+    assert done.stdout.startswith("Usage: ")
+    listed = {line.split()[0]: line for line in done.stdout.splitlines() if line.startswith("  ")}
+    assert len(COMMANDS) >= 11
+    for name, command in COMMANDS.items():
+        assert listed[name].split(maxsplit=1)[1].split()[:3] == command.help.split()[:3]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_teaches(name: str) -> None:
+    """What the command does, and each of its arguments and options, in words."""
+    command = COMMANDS[name]
+    done = CliRunner().invoke(cli.app, [name, "--help"])
+    assert done.exit_code == 0
+    said = done.stdout.split()
+    assert said[0] == "Usage:"
+    assert within(command.help.split(), said)
+    for parameter in command.params:
+        assert parameter.help, f"{parameter.name} has no help"
+        assert within(parameter.help.split(), said), parameter.name
+        if parameter.param_type_name == "option":
+            assert set(parameter.opts) <= {word.strip(",") for word in said}, parameter.name
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if "Example:" in COMMANDS[name].help])
+def test_examples_in_help_are_understood(name: str) -> None:
+    _, said, *arguments = shlex.split(COMMANDS[name].help.partition("Example:")[2])
+    assert said == name
+    COMMANDS[name].make_context(name, arguments)
+
+
+def within(few: list[str], many: list[str]) -> bool:
+    """Whether words stand somewhere among others, one after the other."""
+    return any(many[k : k + len(few)] == few for k in range(len(many) - len(few) + 1))
 
 
 def test_help_loads_nothing_heavy() -> None:
@@ -236,37 +272,66 @@ def test_folder_without_permission(tmp_path: Path) -> None:
     assert_refused(run("fly", "paper-set-point", "--out", str(tmp_path / "out")), ["--out"])
 
 
-def test_interrupt_leaves_whole_files_or_none(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    command = [
-        sys.executable,
-        "-m",
-        "rotorfault.cli.main",
-        "fly",
-        "paper-set-point",
-        "--engine",
-        "python",
-        "--no-figures",
-    ]
-    command += ["--set", "duration=600", "--out", str(out)]
+# Says when it is made and when it has flown for a tenth of a second.
+SLOW = """
+import time as clock
+from rotorfault import Vec3, Wrench
+
+class Slow:
+    def __init__(self):
+        print("made", flush=True)
+        clock.sleep({seconds})
+        self.silent = True
+
+    def update(self, time, measurement, reference, vehicle):
+        if self.silent and time > 0.1:
+            self.silent = False
+            print("flying", flush=True)
+        return Wrench(vehicle.mass * vehicle.gravity, Vec3(0.0, 0.0, 0.0))
+"""
+
+
+def slow_flight(folder: Path, seconds: float) -> subprocess.Popen[str]:
+    """A flight of a minute, whose controller takes a time in s to be made."""
+    (folder / "slow.py").write_text(SLOW.format(seconds=seconds))
+    command = [sys.executable, "-m", "rotorfault.cli.main", "fly", "hover-fault", "--no-figures"]
+    command += ["--controller", f"{folder / 'slow.py'}:Slow", "--engine", "python"]
+    command += ["--out", str(folder / "out")]
+    for assignment in ("fault=[]", "sensors=ideal", "wind.kind=none", "duration=60"):
+        command += ["--set", assignment]
     # A shell that runs the tests in the background lets its children ignore the signal; undone for this child.
-    process = subprocess.Popen(
+    return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    while process.poll() is None and not out.exists():
-        time.sleep(0.05)
-    time.sleep(3.0)  # now it flies; whenever the signal hits, the rules below hold
+
+
+def interrupted(process: subprocess.Popen[str], line: str) -> str:
+    """Interrupt it once it has said something; what it says then."""
+    assert process.stdout is not None
+    for said in process.stdout:
+        if said.strip() == line:
+            break
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=120)
+    output, errors = process.communicate(timeout=120)
     assert process.returncode == 130, errors
     assert "Traceback" not in errors
-    assert not [path for path in out.iterdir() if path.name.startswith(".")]
-    for path in out.glob("*.nc"):
-        flight = rf.load(path)
-        assert flight.outcome.kind == "interrupted"
-        assert flight.outcome.time < 600.0
-        assert json.loads((out / "summary.json").read_text())["outcome"] == "interrupted"
+    return output + errors
+
+
+def test_an_interrupted_flight_is_kept_as_far_as_it_went(tmp_path: Path) -> None:
+    said = interrupted(slow_flight(tmp_path, 0.0), "flying")
+    assert "wrote flight.nc, summary.json" in said
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"flight.nc", "summary.json"}
+    flight = rf.load(tmp_path / "out" / "flight.nc")
+    assert flight.outcome.kind == "interrupted"
+    assert 0.1 <= flight.outcome.time < 60.0
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
+
+
+def test_an_interrupt_before_the_flight_leaves_nothing(tmp_path: Path) -> None:
+    interrupted(slow_flight(tmp_path, 60.0), "made")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name != "slow.py"]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import re
 import warnings
 from itertools import combinations
 
 import numpy as np
 import xarray as xr
+from made_up_records import LAYOUT, dataset, rows_of
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.results.dataset import ATTRIBUTES, dataset
+from rotorfault.results.dataset import ATTRIBUTES
 
 ONSET, THRESHOLD = 1.8, 0.12
 UNIT = re.compile(r"\(.+\)$")
@@ -27,10 +28,10 @@ def made_up(
     """A flight to (2, 2, 2) in which rotors 1 and 3 fail; its signals are smooth with noise on top."""
     time = np.arange(round(duration / 0.01)) * 0.01
     random = np.random.default_rng(seed)
-    signals = 0.01 * random.standard_normal((len(time), len(SIGNAL_NAMES)))
+    signals = 0.01 * random.standard_normal((len(time), len(LAYOUT)))
 
     def put(name: str, values: object) -> None:
-        signals[:, SIGNAL_NAMES.index(name)] = values
+        signals[:, rows_of(name)] = values
 
     for axis in "xyz":
         put(f"position.{axis}", 2.0 - 2.0 * np.exp(-time) + drift * time**2)
@@ -40,9 +41,11 @@ def made_up(
         put(f"loss_estimated.r{rotor}", loss * (1.0 - np.exp(-np.maximum(time - onset, 0.0) / 0.02)))
         put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
         put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
-    put("lyapunov", np.exp(-time) + 1e-6)
+    put("controller.lyapunov", np.exp(-time) + 1e-6)
     given_too: dict[str, object] = dict.fromkeys(ATTRIBUTES, 0.0)
     given_too |= {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
+    begun = onset if onset < duration else None
+    given_too["scores"] = json.dumps({"onset.1": begun, "onset.2": None, "onset.3": begun, "onset.4": None})
     return dataset(signals, time, given_too | attributes)
 
 

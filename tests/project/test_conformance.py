@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
+from rotorfault.base.errors import InputError
 from rotorfault.cli.catalogue import REGISTRIES
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, drive_template, no_watch
@@ -30,7 +31,7 @@ from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.telemetry import SIGNAL_NAMES
 from rotorfault.plant import no_noise
-from rotorfault.scenario.scenario import Scenario, scenario_from
+from rotorfault.scenario.scenario import Mismatch, Scenario, scenario_from
 
 Array = NDArray[np.float64]
 # Where a scenario names a part of each registry. The plant is a bare name: models of the body have no settings.
@@ -47,6 +48,11 @@ KEYS = {
 }
 PARTS = [(group, name) for group, registry in REGISTRIES.items() for name in registry]
 each_part = pytest.mark.parametrize(("group", "name"), PARTS, ids=[f"{group}-{name}" for group, name in PARTS])
+PLANTS = list(REGISTRIES["plants"])
+WITH_SETTINGS = [(group, name) for group, name in PARTS if group != "plants"]
+each_part_with_settings = pytest.mark.parametrize(
+    ("group", "name"), WITH_SETTINGS, ids=[f"{group}-{name}" for group, name in WITH_SETTINGS]
+)
 STEPS = 150  # of 2 ms
 
 
@@ -153,13 +159,9 @@ def test_it_says_in_one_line_what_it_is(group: str, name: str) -> None:
     assert line.endswith((".", ".)")), line
 
 
-@each_part
+@each_part_with_settings
 def test_its_settings_are_checked_and_explained(group: str, name: str) -> None:
-    kind = REGISTRIES[group][name]
-    if group == "plants":
-        kind()
-        return
-    model = kind.Settings
+    model = REGISTRIES[group][name].Settings
     assert issubclass(model, BaseModel)
     with pytest.raises(ValidationError, match="unknown key"):
         model.model_validate({"no such thing": 1.0})
@@ -300,11 +302,9 @@ def _all_nudged(flown: Scenario) -> Scenario:
     return flown
 
 
-@each_part
+@each_part_with_settings
 def test_every_float_of_its_settings_is_a_parameter(group: str, name: str, tmp_path: Path) -> None:
     """Hence the flights of a batch may differ in it, and one compiled loop serves them all."""
-    if group == "plants":
-        return
     key = KEYS[group]
     flown = scenario(tmp_path, **{group: name})
     before, baked = assemble(flown), _baked(flown)
@@ -317,3 +317,31 @@ def test_every_float_of_its_settings_is_a_parameter(group: str, name: str, tmp_p
         if group != "references":  # their numbers are in the table
             numbers = zip(flatten(after.parameters), flatten(before.parameters), strict=True)
             assert any(a != b for a, b in numbers), f"{path} has no effect"
+
+
+MISMATCHES: list[dict[str, Any]] = [
+    {"mass": 1.01},
+    {"inertia": [1.01, 1.0, 1.0]},
+    {"inertia": [1.0, 1.01, 1.0]},
+    {"inertia": [1.0, 1.0, 1.01]},
+    {"rotor_bandwidth": 1.01},
+    {"rotor_gain": 1.01},
+    {"linear_drag": 1.01},
+]
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_the_numbers_of_a_plant_are_those_of_the_true_vehicle(name: str, tmp_path: Path) -> None:
+    """Hence one compiled loop serves all vehicles; each number acts, and only on the truth."""
+    tables = scenario(tmp_path, plants=name).as_tables()
+    with pytest.raises(InputError, match="plant"):
+        scenario_from(tables | {"plant": {"kind": name, "mass": 1.0}}, "test")
+    assert {key for mismatch in MISMATCHES for key in mismatch} == set(Mismatch.model_fields)
+    flown = scenario_from(tables, "test")
+    before, path = assemble(flown), run(flown, "python")
+    for mismatch in MISMATCHES:
+        other = scenario_from(tables | {"mismatch": mismatch}, "test")
+        after = assemble(other)
+        assert structure(after.loop) == structure(before.loop), mismatch
+        assert flatten(after.parameters.autopilot) == flatten(before.parameters.autopilot), mismatch
+        assert np.abs(run(other, "python") - path).max() > 1e-6, mismatch

@@ -106,7 +106,7 @@ def test_fault_onsets_are_marked_and_named_once(one: dict[str, Figure]) -> None:
 def test_no_fault_no_mark() -> None:
     data = made_up()
     data["loss_true"][:] = 0.0
-    drawn = figures.draw(data)
+    drawn = figures.draw(data.assign_attrs(scores="{}"))
     assert not any("onset" in label for figure in drawn.values() for label in legend_labels(figure))
     assert len(drawn["fault_detection"].axes) == 8  # no detail around an onset
 
@@ -210,7 +210,7 @@ def test_path_has_equal_scales_and_its_marks(one: dict[str, Figure]) -> None:
 def test_v_is_logarithmic_and_zero_is_said(one: dict[str, Figure]) -> None:
     assert one["control"].axes[2].get_yscale() == "log"
     data = made_up()
-    data["lyapunov"][:] = 0.0
+    data["controller.lyapunov"][:] = 0.0
     axes = figures.draw(data)["control"].axes[2]
     assert [text.get_text() for text in axes.texts] == ["V = 0"]
 
@@ -221,6 +221,17 @@ def test_a_flight_without_records_is_drawn_empty() -> None:
     assert "lost at once" in legend_labels(drawn["position"])
     for figure in figures.draw(data).values():
         figure.draw_without_rendering()
+
+
+def test_a_fault_between_the_last_record_and_the_end_is_drawn_where_there_is_a_place() -> None:
+    """Records may be seldom: onsets are those of the scenario, whatever was recorded."""
+    data = made_up(duration=2.0).isel(time=slice(0, None, 50))
+    assert float(data["time"][-1]) < ONSET
+    drawn = figures.draw(data)
+    (mark,) = (line for line in drawn["path"].axes[0].lines if line.get_marker() == "D")
+    assert not len(mark.get_data_3d()[0])
+    (onset,) = (line for line in drawn["position"].axes[0].lines if line.get_linestyle() == ":")
+    assert onset.get_xdata()[0] == pytest.approx(ONSET)
 
 
 def test_nothing_to_draw() -> None:

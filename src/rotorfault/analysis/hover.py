@@ -1,4 +1,4 @@
-r"""Attainable hover: whether hover, or rest in a steady wind, is physically possible with losses, whoever controls.
+r"""Attainable hover: whether hover, or rest in a steady wind, is possible with given losses, under any controller.
 
 Rotor i gives any thrust in [lo_i, hi_i] = (1 - loss_i) k [c_min, c_max]. Rest needs the thrust
 

@@ -126,7 +126,7 @@ class LinearLoop(NamedTuple):
         return big
 
 
-# ------------------------------------------------------------------------------------------------- the body, open loop
+# ------------------------------------------------------------------------------------------------ the body, open loop
 
 
 def hover_model(vehicle: Vehicle) -> tuple[Array, Array]:

@@ -9,9 +9,9 @@ a stable loop the nearest such g and tau *are* the margins, however often L_i cr
 is stable. Source: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, chapter 3. A delay of
 whole periods is meant exactly, of fractions as its phase.
 
-Roll carries y and pitch carries x: the position loop is
-closed through the attitude, so these two have a lower gain margin as well. The autopilot knows nothing of gain or
-delay; a law that compares motion with commands (roismc, ismc) takes them for a disturbance.
+Roll carries y and pitch carries x: the position loop is closed through the attitude, so these two have a lower gain
+margin as well. The autopilot knows nothing of gain or delay; a law that compares motion with commands (roismc, ismc)
+takes them for a disturbance.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from rotorfault.analysis.linearisation import AXES, LinearLoop
 from rotorfault.maths.arrays import Array, Complex
 
 # Loop gains outside this range are not looked at. Our choice: no actuator is wrong by a factor of 1e5, and the loop
-# transfer, a small difference of large numbers, is rounding there. A narrower range would miss no margin that matters.
+# transfer is mostly rounding there.
 LOOP_GAIN_RANGE = (1e-5, 1e5)
-GRID = 2000  # frequencies, so some 300 per decade: far more than a crossing needs between two resonances
+GRID = 2000  # frequencies, some 400 per decade at a period of 1 ms; resonances get more of their own
 
 
 class Margins(NamedTuple):
@@ -42,7 +42,17 @@ class Margins(NamedTuple):
 
 
 def margins(linear: LinearLoop) -> dict[str, Margins]:
-    """Gain, delay and phase margin of each axis of `AXES` at the plant's input, the other axes closed."""
+    """Gain, delay and phase margin of each axis at the plant's input, the other axes closed.
+
+    Parameters
+    ----------
+    linear : LinearLoop
+
+    Returns
+    -------
+    dict of str to Margins
+        By the names in `rotorfault.analysis.linearisation.AXES`.
+    """
     if not linear.stable:
         return {axis: Margins(*[math.nan] * 5) for axis in AXES}
     omega = _grid(linear)

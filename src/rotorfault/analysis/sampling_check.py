@@ -1,17 +1,17 @@
 r"""Can a control law be flown at this sampling period and with these rotors? A cheap check of its gains, per axis.
 
 Laws are designed in continuous time for ideal actuators, :math:`\ddot e = u = -k_1 e - k_2\dot e`; they fly sampled,
-behind rotors that lag. For the gains that a controller reports (`ControlTelemetry`), hence for any controller, the
+behind rotors that lag. For the gains that a controller reports (signals ``gain_position`` and others), the
 nominal axis is therefore closed again through a zero-order hold and a first-order lag, exactly,
 
 .. math:: \frac{d}{dt}\begin{pmatrix} e\\ \dot e\\ a\end{pmatrix} =
           \begin{pmatrix} \dot e\\ a\\ w_0(u_k - a)\end{pmatrix}, \qquad u_k = -k_1 e_k - k_2\dot e_k
 
-and an axis is warned of if a sampled pole z is outside the unit circle or its damping -Re(log z)/|log z| is below
-0.1. Source of the sampling: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, section 3.2;
-the limit on damping is our choice. A warning is therefore a proof that the nominal gains are too fast, no warning is
-no proof that all is well: x and y are taken to have the rotors' lag only, as if the attitude followed at once, and
-coupling, limits and switching inputs are left out. `rotorfault.analysis.linearisation` has the whole loop in hover.
+and an axis is reported if a sampled pole z is outside the unit circle or its damping -Re(log z)/|log z| is below
+`LEAST_DAMPING`. Source of the sampling: K. J. Astrom, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997,
+section 3.2. A warning therefore proves that the nominal gains are too fast; the absence of a warning proves nothing:
+x and y are taken to have the rotors' lag only, as if the attitude followed at once, and coupling, limits and
+switching inputs are left out. `rotorfault.analysis.linearisation` has the whole loop in hover.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from rotorfault.model.vehicle import Vehicle, hover_thrust
 from rotorfault.reference import REFERENCE
 from rotorfault.scenario.scenario import Scenario
 
-LEAST_DAMPING = 0.1
+LEAST_DAMPING = 0.1  # our choice: below it an oscillation loses less than half of its height per cycle
 
 
 class AxisGains(NamedTuple):
@@ -92,7 +92,7 @@ def warning(gains: AxisGains, period: float, rotor_bandwidth: float, where: str)
     if least >= LEAST_DAMPING:
         return None
     growth = math.log(max(abs(z))) / period
-    verdict = f"unstable, growing with {growth:.3g} 1/s" if least < 0.0 else f"hardly damped, damping {least:.2g}"
+    verdict = f"unstable, growing with {growth:.3g} 1/s" if least < 0.0 else f"poorly damped, damping {least:.2g}"
     path = "" if gains.direct else f" behind rotors of {rotor_bandwidth:g} rad/s"
     pole = f"{p.real:.4g} rad/s" if abs(p.imag) < 1e-9 * abs(p) else f"{p.real:.4g} +- {abs(p.imag):.4g}j rad/s"
     return (
@@ -172,17 +172,17 @@ def sampled_data_check(
     places = [("at the target", at_rest(), target)]
     if estimate is not None:
         places.append(("at the start", estimate, target if reference is None else reference))
-    found: dict[str, str] = {}
-    for where, seen, wanted in places:
+    lines: dict[str, str] = {}
+    for where, start, goal in places:
         try:
-            reported = reported_gains(controller, vehicle, period, seen, wanted)
+            reported = reported_gains(controller, vehicle, period, start, goal)
         except (ZeroDivisionError, OverflowError):
             return [f"{where}: the controller's gains are not finite; its settings are too extreme for doubles"]
         for gains in reported:
             line = warning(gains, period, vehicle.rotor_bandwidth, where)
             if line is not None:
-                found.setdefault(gains.axis, line)
-    return list(found.values())
+                lines.setdefault(gains.axis, line)
+    return list(lines.values())
 
 
 def sampled_data_warnings(scenario: Scenario, controller: Any = None) -> list[str]:

@@ -1,9 +1,9 @@
 """Trim: what hover takes, how the closed loop behaves about it, and how much gain and delay it stands.
 
-What ``rotorfault trim VEHICLE`` prints. Hover is closed form; poles and margins come from `rotorfault.analysis.linearisation`
-and `rotorfault.analysis.margins`, on the full rigid body without wind and faults, with diagnosis `off` and allocation
-`nominal`: an observer acts on the motion only through its decision. A given loss changes nothing in them: it is asked
-of `rotorfault.analysis.hover` alone, whether hover is still possible.
+What ``rotorfault trim VEHICLE`` prints. Hover is closed form; poles and margins come from
+`rotorfault.analysis.linearisation` and `rotorfault.analysis.margins`, on the full rigid body without wind and faults,
+with diagnosis `off` and allocation `nominal`: an observer acts on the motion only through its decision. A loss
+changes nothing in them; `rotorfault.analysis.hover` says whether hover is still possible with it.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def trim_report(
     period: float = 0.001,
     loss: PerRotor | None = None,
 ) -> TrimReport:
-    """Hover, what of it losses leave, closed-loop poles, gain and delay margins and what to be warned of.
+    """Hover, what of it losses leave, closed-loop poles, gain and delay margins, and warnings.
 
     Parameters
     ----------
@@ -182,32 +182,32 @@ def trim_report(
         table = {"kind": controller} | ({} if preset is None else {"preset": preset})
         # Whoever names code here wants it run.
         part = part_from(CONTROLLER, table, (controller,) if is_place(controller) else False)
-        made, name = part.make(), controller + ("" if preset is None else f" ({preset})")
+        block, name = part.make(), controller + ("" if preset is None else f" ({preset})")
     else:
-        made, name = as_controller(controller), type(controller).__name__
-    warnings = sampled_data_check(made, numbers, period)
-    linear, found = None, {}
+        block, name = as_controller(controller), type(controller).__name__
+    warnings = sampled_data_check(block, numbers, period)
+    linear, axis_margins = None, {}
     try:
-        linear = linearise(*hover_loop(numbers, made, period))
-        found = margins(linear)
-        warnings += _loop_warnings(linear, found)
+        linear = linearise(*hover_loop(numbers, block, period))
+        axis_margins = margins(linear)
+        warnings += _loop_warnings(linear, axis_margins)
     except InputError as error:
         warnings.append(f"no linearisation: {error}")
     possible = attainable(numbers, loss)
-    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, found, tuple(warnings))
+    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, axis_margins, tuple(warnings))
 
 
-def _loop_warnings(linear: LinearLoop, found: dict[str, Margins]) -> list[str]:
+def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list[str]:
     if not linear.stable:
         z = linear.poles[0]
         s = np.log(z) / linear.period
         return [f"the closed loop is not stable in hover: pole {_complex(s)} rad/s, |z| = {abs(z):.6g}; no margins"]
     lines = [
-        f"closed-loop pole {_complex(s)} rad/s is hardly damped: {-s.real / abs(s):.2g}, below {LEAST_DAMPING:g}"
+        f"closed-loop pole {_complex(s)} rad/s is poorly damped: {-s.real / abs(s):.2g}, below {LEAST_DAMPING:g}"
         for s, _, _ in _distinct(linear)
         if -s.real < LEAST_DAMPING * abs(s)
     ]
-    for axis, m in found.items():
+    for axis, m in axis_margins.items():
         if m.gain_up < LEAST_GAIN_MARGIN:
             lines.append(f"{axis}: gain margin {m.gain_up:.3g} ({_decibel(m.gain_up)}), below the usual 6 dB")
         if m.gain_down > 1.0 / LEAST_GAIN_MARGIN:
@@ -261,7 +261,7 @@ def _pole_lines(report: TrimReport) -> list[str]:
 
 def _margin_lines(report: TrimReport) -> list[str]:
     if report.linear is None or not report.linear.stable:
-        return ["Margins: none, for want of a loop that is stable in hover"]
+        return ["Margins: none, the loop is not stable in hover"]
     rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
     for axis, m in report.margins.items():
         up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
@@ -301,11 +301,11 @@ def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
     # Computed, a double real pole is a close complex pair.
     s = np.where(np.abs(s.imag) <= 1e-5 * np.abs(s), s.real, s)
     left = [i for i in np.argsort(np.abs(s)) if abs(z[i]) > DEADBEAT and s[i].imag >= 0.0]
-    found: list[tuple[complex, int, str]] = []
+    poles: list[tuple[complex, int, str]] = []
     while left:
         same = [i for i in left if abs(s[i] - s[left[0]]) <= SAME_POLE * abs(s[left[0]])]
         share = motion[:, same].sum(axis=1)
         moved = [axis for axis, part in zip(AXES, share, strict=True) if part > max(1e-4 * share.max(), 1e-9)]
-        found.append((complex(np.mean(s[same])), len(same), ", ".join(moved) or "none (memory)"))
+        poles.append((complex(np.mean(s[same])), len(same), ", ".join(moved) or "none (memory)"))
         left = [i for i in left if i not in same]
-    return found
+    return poles

@@ -10,7 +10,7 @@ the faster one times the longest period, 10 ms, stays below 1, and the controlle
 Its truth is `rotorfault.engine.taylor`: the same sampling instants, and motion between them exact to rounding. What
 is measured is the error of the integrator, not what a longer sampling period does to control.
 
-Whether an error matters is told by a yardstick: how far off the same flight is with the standard noise of the
+A yardstick says whether an error matters: how far off the same flight is with the standard noise of the
 sensors (root mean square over flights), or with one percent more mass, whichever is more. An error does not matter
 below a thousandth of the smallest such yardstick of all sampling periods, without faults and with them: at the end
 of the flight, where most simulators are compared, or throughout, which the moments after a fault decide.
@@ -84,7 +84,7 @@ def measure(quick: bool = False, say: Say = lambda _: None) -> dict[str, Any]:
     quick : bool
         Fewer steps, and 1,000 flights at a time instead of 10,000: half a minute instead of four.
     say : callable
-        Is told what is being done, line by line.
+        Takes what is being done, line by line.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def manoeuvre(period: float, step: float, flight: str = "sound", **tables: Any) 
     **tables
         Of the scenario, in place of those of the flight.
     """
-    given = {
+    defaults = {
         "name": "accuracy",
         "vehicle": "paper",
         "plant": "rigid_body",
@@ -159,33 +159,33 @@ def manoeuvre(period: float, step: float, flight: str = "sound", **tables: Any) 
         "controller": {"kind": "roismc", "preset": "tuned"},
         "diagnosis": {"kind": "luenberger", "poles": [60.0, 80.0]},
     }
-    return scenario_from(given | tables, "accuracy")
+    return scenario_from(defaults | tables, "accuracy")
 
 
 def positions(batch: Batch, recording: Recording) -> Array:
     """Positions at all sampling instants and at the end, shape (steps + 1, 3, N), in m."""
     names = leaf_names(batch.state)
     rows = [names.index(f"plant.body.p_W.{axis}") for axis in "xyz"]
-    wanted = list(_POSITION) if batch.wanted is None else [batch.wanted.index(row) for row in _POSITION]
-    return np.concatenate([recording.signals[:, wanted], recording.state[None, rows]])
+    columns = list(_POSITION) if batch.wanted is None else [batch.wanted.index(row) for row in _POSITION]
+    return np.concatenate([recording.signals[:, columns], recording.state[None, rows]])
 
 
 class _Truths:
     """Flights that others are compared with, each flown once."""
 
     def __init__(self, say: Say) -> None:
-        self._say, self._known = say, dict[tuple[float, str, float], Array]()
+        self._say, self._paths = say, dict[tuple[float, str, float], Array]()
 
     def get(self, period: float, flight: str, tolerance: float = TOLERANCES[-1]) -> Array:
         key = (period, flight, tolerance)
-        if key not in self._known:
+        if key not in self._paths:
             self._say(f"truth of the {flight} flight, sampled every {1e3 * period:g} ms")
             batch = assemble(manoeuvre(period, period, flight))
-            self._known[key] = positions(batch, fly_taylor(batch, no_watch, tolerance))
-        return self._known[key]
+            self._paths[key] = positions(batch, fly_taylor(batch, no_watch, tolerance))
+        return self._paths[key]
 
 
-def _flown(scenario: Scenario, flights: int = 1) -> Array:
+def _fly(scenario: Scenario, flights: int = 1) -> Array:
     """Positions of the compiled engine; of several flights, which differ in their random numbers."""
     batch = assemble(scenario)._replace(wanted=_POSITION)
     if flights > 1:
@@ -203,14 +203,14 @@ def _off(path: Array, truth: Array) -> Off:
 
 def _yardsticks(effort: Effort, say: Say) -> list[dict[str, Any]]:
     """What noise and a wrong mass do, at each sampling period."""
-    found = []
+    yardsticks = []
     for flight in FLIGHTS:
         for period in effort.steps:
             say(f"noise and mass in the {flight} flight, sampled every {1e3 * period:g} ms")
-            path = _flown(manoeuvre(period, period, flight))
-            noise = _off(_flown(manoeuvre(period, period, flight, sensors="noisy"), effort.noisy), path)
-            mass = _off(_flown(manoeuvre(period, period, flight, mismatch={"mass": 1.01})), path)
-            found.append(
+            path = _fly(manoeuvre(period, period, flight))
+            noise = _off(_fly(manoeuvre(period, period, flight, sensors="noisy"), effort.noisy), path)
+            mass = _off(_fly(manoeuvre(period, period, flight, mismatch={"mass": 1.01})), path)
+            yardsticks.append(
                 {
                     "flight": flight,
                     "control_period": period,
@@ -220,13 +220,13 @@ def _yardsticks(effort: Effort, say: Say) -> list[dict[str, Any]]:
                     "largest_mass_m": mass.largest,
                 }
             )
-    return found
+    return yardsticks
 
 
 def _point(period: float, step: float, truths: _Truths, effort: Effort, say: Say) -> dict[str, Any]:
     flights = {}
     for flight in FLIGHTS:
-        error = _off(_flown(manoeuvre(period, step, flight)), truths.get(period, flight))
+        error = _off(_fly(manoeuvre(period, step, flight)), truths.get(period, flight))
         flights[flight] = {"error_m": error.end, "largest_error_m": error.largest}
     say(f"step {1e3 * step:g} ms, sampled every {1e3 * period:g} ms: {effort.batch} flights on one core")
     wall, processor = _speed(assemble(manoeuvre(period, step)), effort)
@@ -297,13 +297,13 @@ def _order(points: Sequence[dict[str, Any]], flight: str) -> float | None:
 
 def _truth_error(truths: _Truths) -> dict[str, Any]:
     """How far the truth itself is to be trusted, in the flights of the longest period: there series are longest."""
-    found: dict[str, Any] = {"tolerances": list(TOLERANCES), "rk4_step": PERIOD / FINEST, "flights": {}}
+    errors: dict[str, Any] = {"tolerances": list(TOLERANCES), "rk4_step": PERIOD / FINEST, "flights": {}}
     for flight in FLIGHTS:
         truth, coarser = (truths.get(PERIOD, flight, tolerance) for tolerance in reversed(TOLERANCES))
-        finest = _flown(manoeuvre(PERIOD, PERIOD / FINEST, flight))
-        found["flights"][flight] = {
+        finest = _fly(manoeuvre(PERIOD, PERIOD / FINEST, flight))
+        errors["flights"][flight] = {
             "tolerance_m": _off(coarser, truth).largest,
             "rk4_m": _off(finest, truth).end,
             "largest_rk4_m": _off(finest, truth).largest,
         }
-    return found
+    return errors

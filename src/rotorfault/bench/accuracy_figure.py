@@ -108,12 +108,12 @@ def _peers(peers: Mapping[str, Any]) -> Iterator[Series]:
 
 
 def _points(entries: Sequence[Mapping[str, Any]]) -> list[Point]:
-    found = []
+    points = []
     for entry in sorted(entries, key=lambda entry: float(entry["step"])):
         error, speed = float(entry["error_m"]), float(entry["simulated_s_per_s_per_core"])
         if 0.0 < error < math.inf and 0.0 < speed < math.inf:
-            found.append(Point(1e6 / speed, error, f"{1e3 * float(entry['step']):.3g} ms"))
-    return found
+            points.append(Point(1e6 / speed, error, f"{1e3 * float(entry['step']):.3g} ms"))
+    return points
 
 
 def _axes(axes: Axes, points: Sequence[Point], limit: float) -> None:

@@ -35,8 +35,8 @@ PERIOD = 1e-3  # s, of sampling and integration
 
 def scenario(duration: float, **settings: Any) -> Scenario:
     """The flight that is measured."""
-    given = {"controller.kind": "roismc", "plant": "rigid_body", "duration": duration} | settings
-    return load_scenario("paper-set-point", given)
+    overrides = {"controller.kind": "roismc", "plant": "rigid_body", "duration": duration} | settings
+    return load_scenario("paper-set-point", overrides)
 
 
 def different(count: int, seed: int = 1) -> dict[str, Any]:
@@ -84,21 +84,21 @@ def speed(steps_per_s: float, cores: int) -> dict[str, float]:
 
 def measure_batches(cores: int, quick: bool, say: Say) -> dict[str, Any]:
     """Batches of `SIZES`, each on one core and on all, some 20 million steps a call (quick: 5)."""
-    found: dict[str, Any] = {}
-    repeats, wanted = (3, 5e6) if quick else (7, 2e7)
+    speeds: dict[str, Any] = {}
+    repeats, steps = (3, 5e6) if quick else (7, 2e7)
     for size in SIZES:
-        duration = float(np.clip(round(wanted / size * PERIOD, 1), 0.2, 20.0))
+        duration = float(np.clip(round(steps / size * PERIOD, 1), 0.2, 20.0))
         say(f"batch of {size:,}: {duration:g} s each")
         batch = batch_of(size, duration)
         one = speed(timed(batch, 1, repeats), 1)
-        found[str(size)] = one | {"flight_seconds": duration}
+        speeds[str(size)] = one | {"flight_seconds": duration}
         if cores > 1:
             together = timed(batch, cores, repeats)
-            found[str(size)]["all_cores"] = speed(together, cores) | {
+            speeds[str(size)]["all_cores"] = speed(together, cores) | {
                 "cores": cores,
                 "over_one_core": together / one["steps_per_s"],
             }
-    return found
+    return speeds
 
 
 def measure_noise(quick: bool, say: Say) -> dict[str, Any]:
@@ -113,10 +113,10 @@ def measure_noise(quick: bool, say: Say) -> dict[str, Any]:
         "gusts": {"wind.kind": "dryden"},
         "noise_and_gusts": {"sensors.kind": "noisy", "wind.kind": "dryden"},
     }
-    found = {name: timed(batch_of(1_000, duration, **calm, **case), 1, repeats) for name, case in cases.items()}
+    speeds = {name: timed(batch_of(1_000, duration, **calm, **case), 1, repeats) for name, case in cases.items()}
     return {
-        name: {"steps_per_s_per_core": value, "cost_factor": found["without"] / value}
-        for name, value in found.items()
+        name: {"steps_per_s_per_core": value, "cost_factor": speeds["without"] / value}
+        for name, value in speeds.items()
     }
 
 
@@ -139,19 +139,25 @@ def measure_scaling(quick: bool, say: Say) -> dict[str, Any]:
 
     Each in a process of its own; its memory is all that the process ever held, Python and libraries included.
     """
-    found: dict[str, Any] = {}
+    costs: dict[str, Any] = {}
     for size in (1_000, 10_000) if quick else (1_000, 10_000, 100_000):
         say(f"{size:,} flights through fly_many")
         done = subprocess.run(
             [sys.executable, "-c", f"from rotorfault.bench.flights import alone; alone({size})"],
             capture_output=True, text=True, check=True,
         )  # fmt: skip
-        found[str(size)] = json.loads(done.stdout)
-    return found
+        costs[str(size)] = json.loads(done.stdout)
+    return costs
 
 
 def alone(size: int) -> None:
-    """Fly so many flights and print what that took, as JSON."""
+    """Fly a batch and print what that took, as JSON.
+
+    Parameters
+    ----------
+    size : int
+        Flights in the batch.
+    """
     flown = scenario(0.1)
     fly_many(flown, different(64))
     columns = different(size)

@@ -33,10 +33,10 @@ def measure(quick: bool = False) -> dict[str, Any]:
     """
     batch = assemble(scenario(0.1))
     calls = {"simd": 20_000, "python": 4_000, "numpy": 2_000}
-    found = {}
+    latencies = {}
     for name, update in (("simd", _compiled(batch)), ("python", _floats(batch)), ("numpy", _arrays(batch))):
-        found[name] = _latency(update, calls[name] // (10 if quick else 1))
-    return found
+        latencies[name] = _latency(update, calls[name] // (10 if quick else 1))
+    return latencies
 
 
 def _latency(update: Callable[[], object], calls: int) -> dict[str, float]:
@@ -87,8 +87,8 @@ def _arrays(batch: Batch) -> Callable[[], object]:
 def _compiled(batch: Batch) -> Callable[[], object]:
     instant, period = _instant(batch), batch.parameters.period
 
-    def update(*given: Any) -> Any:
-        arguments = [*given, period]
+    def update(*parts: Any) -> Any:
+        arguments = [*parts, period]
         memory, command, _ = batch.loop.autopilot.step(*arguments)
         return memory, command
 

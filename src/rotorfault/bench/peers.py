@@ -40,7 +40,7 @@ class Peer(NamedTuple):
     script : str
         In ``peer_scripts``.
     cost : str
-        Of its installation, told before it begins.
+        Of its installation, announced before it begins.
     mend : str
         What its installation needs that may be missing.
     """
@@ -98,7 +98,7 @@ def environment(peer: Peer, say: Say = lambda _: None) -> Path:
     ----------
     peer : Peer
     say : callable
-        Is told when an installation begins and ends.
+        Takes a line when an installation begins or ends.
 
     Returns
     -------
@@ -111,8 +111,8 @@ def environment(peer: Peer, say: Say = lambda _: None) -> Path:
     """
     folder = _cache() / f"{peer.name}-{peer.version}"
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    wanted = {"requirements": list(peer.requirements), "python": sys.version}
-    if _stamp(folder) == wanted and python.exists():
+    stamp = {"requirements": list(peer.requirements), "python": sys.version}
+    if _stamp(folder) == stamp and python.exists():
         return python
     say(f"{peer.name} {peer.version}: installing into {folder} ({peer.cost})")
     start = time.monotonic()
@@ -127,7 +127,7 @@ def environment(peer: Peer, say: Say = lambda _: None) -> Path:
     _install(peer, [sys.executable, "-m", "venv", str(folder)])
     pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     _install(peer, [*pip, *peer.requirements])
-    (folder / STAMP).write_text(json.dumps(wanted, indent=1), encoding="utf-8")
+    (folder / STAMP).write_text(json.dumps(stamp, indent=1), encoding="utf-8")
     say(f"{peer.name} {peer.version}: installed in {time.monotonic() - start:.0f} s")
     return python
 
@@ -146,7 +146,7 @@ def measure(
     cores : int, optional
         What "all cores" means; those that this process may use if not given. With 1 only one core is measured.
     say : callable
-        Is told what is being done, line by line.
+        Takes what is being done, line by line.
 
     Returns
     -------

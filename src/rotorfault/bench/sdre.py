@@ -167,9 +167,9 @@ def _ours(
     """Time of the compiled solver in a batch and from a single call, which is Python's overhead for the most part."""
     compiled = CompiledFunction(solve, cases[0])
     template, rows = solve(cases[0]), _rows(cases)
-    found = compiled(rows)
+    solutions = compiled(rows)
     costs = [
-        _cost(case, unflatten(template, [float(x) for x in found[:, i]]), d)
+        _cost(case, unflatten(template, [float(x) for x in solutions[:, i]]), d)
         for i, (case, d) in enumerate(zip(cases, dense, strict=True))
     ]
     many, one, calls = grouped(_rows(cases, batch), lanes()), grouped(rows[:, :1], lanes()), 200
@@ -221,11 +221,11 @@ def _dense(size: int, case: Case) -> _Dense:
     return _Dense(A, B, Q, R, B @ np.linalg.solve(R, B.T))
 
 
-def _cost(case: Case, found: Any, dense: _Dense) -> Array:
+def _cost(case: Case, solution: Any, dense: _Dense) -> Array:
     """P of a solution, whose gains are R^-1 B^T P."""
-    P = cost_matrix(_attitude(case), found[0])
-    if len(found) > 3:
-        r, k1, k2 = np.diag(dense.R)[3:], np.array(list(found[3])), np.array(list(found[4]))
+    P = cost_matrix(_attitude(case), solution[0])
+    if len(solution) > 3:
+        r, k1, k2 = np.diag(dense.R)[3:], np.array(list(solution[3])), np.array(list(solution[4]))
         P11, P12, P22 = np.diag(r * k1 * k2), np.diag(r * k1), np.diag(r * k2)
         P = block_diag(P, np.block([[P11, P12], [P12, P22]]))
     return np.asarray(P, dtype=np.float64)

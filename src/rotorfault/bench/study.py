@@ -22,7 +22,7 @@ from rotorfault.engine.machine import Machines
 
 FLOPS = {"fma": 2, "fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1}
 """Floating-point operations of an instruction; comparisons, selections and bit operations count as none."""
-IDLE = "none"  # sort of instructions that only name places
+IDLE = "none"  # kind of instructions that only name places
 
 
 def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     quick : bool
         Fewer and shorter repetitions.
     say : callable
-        Is told what is being measured, line by line.
+        Takes what is being measured, line by line.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     say("peak of fused multiplications and additions")
     peak = peak_flops(3 if quick else 9)
-    found: dict[str, Any] = {
+    results: dict[str, Any] = {
         "machine": {
             "processor": _processor(),
             "cores": cores,
@@ -68,32 +68,32 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
         "noise": flights.measure_noise(quick, say),
         "scaling": flights.measure_scaling(quick, say),
     }
-    best = max(part["steps_per_s_per_core"] for part in found["batch"].values())
-    found["operations"] = _operations(best, peak)
+    best = max(part["steps_per_s_per_core"] for part in results["batch"].values())
+    results["operations"] = _operations(best, peak)
     say("Riccati solvers")
-    found["sdre"] = sdre.measure(quick)
+    results["sdre"] = sdre.measure(quick)
     say("latency of a control update")
-    found["latency"] = latency.measure(quick)
-    found["accuracy"] = None
+    results["latency"] = latency.measure(quick)
+    results["accuracy"] = None
     if importlib.util.find_spec("heyoka") is not None:
-        found["accuracy"] = accuracy.measure(quick, say)
-    found["peers"] = peers.measure(list(peers.PEERS), quick, cores, say) if with_peers else {}
-    return found
+        results["accuracy"] = accuracy.measure(quick, say)
+    results["peers"] = peers.measure(list(peers.PEERS), quick, cores, say) if with_peers else {}
+    return results
 
 
-def save(found: dict[str, Any], path: Path) -> None:
+def save(results: dict[str, Any], path: Path) -> None:
     """Write the numbers as JSON."""
-    text = json.dumps(found, indent=1, allow_nan=False) + "\n"
+    text = json.dumps(results, indent=1, allow_nan=False) + "\n"
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def _operations(steps_per_s: float, peak: float) -> dict[str, Any]:
     """Operations of a step, counted in the trace, and the share of the machine's peak that they come to."""
     counts = Machines(flights.batch_of(8, 0.1)).get(with_signals=False).operations
-    flops = sum(FLOPS.get(sort, 0) * count for sort, count in counts.items())
+    flops = sum(FLOPS.get(kind, 0) * count for kind, count in counts.items())
     return {
-        "instructions": sum(count for sort, count in counts.items() if sort != IDLE),
-        "by_sort": {sort: count for sort, count in sorted(counts.items(), key=lambda x: -x[1]) if sort != IDLE},
+        "instructions": sum(count for kind, count in counts.items() if kind != IDLE),
+        "by_sort": {kind: count for kind, count in sorted(counts.items(), key=lambda x: -x[1]) if kind != IDLE},
         "flops": flops,
         "gflops_per_core": flops * steps_per_s * 1e-9,
         "share_of_peak": flops * steps_per_s / peak,
@@ -112,20 +112,21 @@ def _processor() -> str:
 # --------------------------------------------------------------------------------------------------------------- text
 
 
-def text(found: dict[str, Any]) -> str:
+def text(results: dict[str, Any]) -> str:
     """The numbers as tables to be read."""
-    parts = [_machine(found), _flights(found), _limits(found), _sdre(found["sdre"]), _latency(found["latency"])]
-    if found["accuracy"] is not None:
-        parts.append(_accuracy(found["accuracy"]))
+    parts = [_machine(results), _flights(results), _limits(results)]
+    parts += [_sdre(results["sdre"]), _latency(results["latency"])]
+    if results["accuracy"] is not None:
+        parts.append(_accuracy(results["accuracy"]))
     else:
         parts.append("error against cost: not measured, for heyoka is not installed (rotorfault[bench])")
-    if found["peers"]:
-        parts.append(_peers(found))
+    if results["peers"]:
+        parts.append(_peers(results))
     return "\n\n".join(parts)
 
 
-def _machine(found: dict[str, Any]) -> str:
-    m = found["machine"]
+def _machine(results: dict[str, Any]) -> str:
+    m = results["machine"]
     return (
         f"{m['processor']}, {m['cores']} cores, Python {m['python']}, rotorfault {m['rotorfault']}\n"
         f"peak of fused multiplications and additions: {m['peak_gflops_per_core']:.1f} Gflop/s per core"
@@ -137,9 +138,9 @@ def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join(table_lines([head, *rows], "<" + ">" * (len(head) - 1), rule=True))
 
 
-def _flights(found: dict[str, Any]) -> str:
+def _flights(results: dict[str, Any]) -> str:
     rows = []
-    for size, part in found["batch"].items():
+    for size, part in results["batch"].items():
         together = part.get("all_cores")
         rows.append(
             (
@@ -150,7 +151,7 @@ def _flights(found: dict[str, Any]) -> str:
                 "" if together is None else f"{together['over_one_core']:.2f}",
             )
         )
-    single = found["single"]
+    single = results["single"]
     head = ("flights", "steps/s, one core", "simulated s/s", "all cores", "over one core")
     return (
         _table(head, rows)
@@ -159,15 +160,15 @@ def _flights(found: dict[str, Any]) -> str:
     )
 
 
-def _limits(found: dict[str, Any]) -> str:
-    o, noise = found["operations"], found["noise"]
-    sorts = ", ".join(f"{count} {sort}" for sort, count in list(o["by_sort"].items())[:9])
+def _limits(results: dict[str, Any]) -> str:
+    o, noise = results["operations"], results["noise"]
+    kinds = ", ".join(f"{count} {kind}" for kind, count in list(o["by_sort"].items())[:9])
     scaling = ", ".join(
         f"{int(size):,}: {part['us_per_flight']:.0f} us, {part['peak_memory_MB']:.0f} MB"
-        for size, part in found["scaling"].items()
+        for size, part in results["scaling"].items()
     )
     return (
-        f"a step: {o['instructions']:,} vector instructions ({sorts} ...), {o['flops']:,} flop;"
+        f"a step: {o['instructions']:,} vector instructions ({kinds} ...), {o['flops']:,} flop;"
         f" {o['gflops_per_core']:.1f} Gflop/s, {100 * o['share_of_peak']:.0f} % of the peak\n"
         f"cost of sensor noise {noise['noise']['cost_factor']:.2f}, of gusts {noise['gusts']['cost_factor']:.2f}, "
         f"of both {noise['noise_and_gusts']['cost_factor']:.2f} times that without\n"
@@ -175,9 +176,9 @@ def _limits(found: dict[str, Any]) -> str:
     )
 
 
-def _sdre(sdre: dict[str, Any]) -> str:
+def _sdre(results: dict[str, Any]) -> str:
     parts = []
-    for size, part in sdre["sizes"].items():
+    for size, part in results["sizes"].items():
         rows = [
             (name, "not installed", "")
             if solver is None
@@ -193,12 +194,12 @@ def _sdre(sdre: dict[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
-def _latency(found: dict[str, Any]) -> str:
-    rows = [(name, f"{part['median_us']:,.1f}", f"{part['p99_9_us']:,.1f}") for name, part in found.items()]
+def _latency(latencies: dict[str, Any]) -> str:
+    rows = [(name, f"{part['median_us']:,.1f}", f"{part['p99_9_us']:,.1f}") for name, part in latencies.items()]
     return _table(("one control update", "median us", "99.9 % us"), rows)
 
 
-def draw(found: dict[str, Any], path: Path) -> None:
+def draw(results: dict[str, Any], path: Path) -> None:
     """Draw error against cost, the peers beside ours where they were measured.
 
     Raises
@@ -206,19 +207,19 @@ def draw(found: dict[str, Any], path: Path) -> None:
     InputError
         If the errors were not measured.
     """
-    if found["accuracy"] is None:
+    if results["accuracy"] is None:
         raise InputError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
-    peers_there = {name: peer for name, peer in found["peers"].items() if "error" not in peer}
+    peers_there = {name: peer for name, peer in results["peers"].items() if "error" not in peer}
     # matplotlib takes a second to load, which the measurements need not spend.
     from rotorfault.bench import accuracy_figure
 
-    figure = accuracy_figure.draw(found["accuracy"], peers_there or None)
+    figure = accuracy_figure.draw(results["accuracy"], peers_there or None)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=150))
 
 
-def _accuracy(found: dict[str, Any]) -> str:
+def _accuracy(results: dict[str, Any]) -> str:
     parts = []
-    for name, curve in found["curves"].items():
+    for name, curve in results["curves"].items():
         rows = [
             (
                 f"{1e3 * point['step']:g} ms",
@@ -234,12 +235,12 @@ def _accuracy(found: dict[str, Any]) -> str:
             + ("none" if cheapest is None else f"{1e3 * cheapest:g} ms")
         )
     return "\n\n".join(
-        [*parts, f"errors below {found['limit_m']:.1e} m do not matter (a thousandth of the yardstick)"]
+        [*parts, f"errors below {results['limit_m']:.1e} m do not matter (a thousandth of the yardstick)"]
     )
 
 
-def _peers(found: dict[str, Any]) -> str:
-    ours = found["batch"]["10000"]
+def _peers(results: dict[str, Any]) -> str:
+    ours = results["batch"]["10000"]
     rows = [
         (
             "rotorfault, whole fault-tolerant loop",
@@ -249,7 +250,7 @@ def _peers(found: dict[str, Any]) -> str:
             "1",
         )
     ]
-    for name, peer in found["peers"].items():
+    for name, peer in results["peers"].items():
         if "error" in peer:
             rows.append((f"{name}: {peer['error'][:60]}", "", "", "", ""))
             continue

@@ -1,6 +1,6 @@
 """Studies: which flights a campaign flies, as TOML or from Python, checked once.
 
-Built-in studies are in ``rotorfault/campaigns/studies``. A study names axes (a map has two), quantities that are
+Built-in studies are in ``campaigns/studies``. A study names axes (a map has two), quantities that are
 drawn anew for each flight, and variants that are compared: every variant flies the same draws with the same seeds.
 """
 

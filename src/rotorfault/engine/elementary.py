@@ -101,7 +101,7 @@ def _kernels(code: Code, r: str) -> tuple[str, str]:
 
 
 def _in_quadrant(code: Code, shifted: str, quarter_turns: int, sin_r: str, cos_r: str) -> str:
-    """The sine after so many quarter turns more than the lowest bits of `shifted` say."""
+    """The sine `quarter_turns` beyond the quadrant that the lowest bits of `shifted` name."""
     quadrant = code.integer_op("add", code.bits(shifted), code.integer(quarter_turns))
     value = code.select(code.bit_set(quadrant, 1), cos_r, sin_r)
     flip = code.integer_op("shl", code.integer_op("and", quadrant, code.integer(2)), code.integer(62))

@@ -65,14 +65,14 @@ class Emitter:
     code : Code
     leaves : dict of Leaf
         Where each kind of leaf ('par', 'state', ...) is read from.
-    given : dict
+    computed : dict
         Term indices that are read as leaf ('par', row): computed before.
     merging : Merging
         Which operations become one.
     """
 
-    def __init__(self, code: Code, leaves: dict[str, Leaf], given: dict[int, int], merging: Merging) -> None:
-        self.code, self._leaves, self._given, self._merging = code, leaves, given, merging
+    def __init__(self, code: Code, leaves: dict[str, Leaf], computed: dict[int, int], merging: Merging) -> None:
+        self.code, self._leaves, self._computed, self._merging = code, leaves, computed, merging
         self._numbers: dict[int, str] = {}
         self._masks: dict[int, str] = {}
 
@@ -89,13 +89,13 @@ class Emitter:
             if term.op == "const" or term.index in needed:
                 continue
             needed.add(term.index)
-            if term.index not in self._given:
+            if term.index not in self._computed:
                 todo += [a for a in self._needed(term) if isinstance(a, Term)]
         tape = next(iter(outputs)).tape if needed else None
         for index in sorted(needed):
             assert tape is not None
             term = tape.terms[index]
-            if isinstance(term.args[0], Term) and index not in self._given:
+            if isinstance(term.args[0], Term) and index not in self._computed:
                 self._write(term)
 
     def number(self, term: Term) -> str:
@@ -118,16 +118,16 @@ class Emitter:
             self._masks[term.index] = self.code.compare("une", self._number(term), self.code.constant(0.0))
         return self._masks[term.index]
 
-    def _write(self, wanted: Term) -> None:
+    def _write(self, root: Term) -> None:
         """Write a term and all that it needs, arguments first; without recursion, for chains are long."""
-        todo = [wanted]
+        todo = [root]
         while todo:
             term = todo[-1]
             if term.op == "const" or term.index in self._numbers or term.index in self._masks:
                 todo.pop()
                 continue
-            if term.index in self._given:
-                self._numbers[term.index] = self._leaf("par", self._given[term.index])
+            if term.index in self._computed:
+                self._numbers[term.index] = self._leaf("par", self._computed[term.index])
             elif not isinstance(term.args[0], Term):
                 self._numbers[term.index] = self._leaf(term.op, term.args[0])
             else:

@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 from rotorfault.engine.batch import Batch, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
+from rotorfault.engine.structure import skeleton
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
@@ -109,6 +110,44 @@ def trace(batch: Batch) -> Traced:
     moved = loop.substep(state, command, start + tape.term("count", 0) * dt, parameters, dt)
     move = Section(tape, [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(moved))], [])
     return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
+
+
+_PROVEN: dict[tuple[str, ...], set[int]] = {}  # by a loop's skeleton: floats of its own parts that are no structure
+
+
+def same_code(one: Batch, other: Batch) -> bool:
+    """Whether two batches can be flown as one, by the same compiled code.
+
+    Parts from outside the package may use a float of their settings anywhere. Where two loops differ in such floats
+    alone, both are traced: if the floats are parameters, as they should be, the traces are equal.
+
+    Parameters
+    ----------
+    one, other : Batch
+    """
+    (words, numbers), (others, more) = skeleton(one.loop), skeleton(other.loop)
+    if words != others or len(numbers) != len(more):
+        return False
+    differ = {place for place, (a, b) in enumerate(zip(numbers, more, strict=True)) if a != b}
+    if differ <= _PROVEN.get(words, set()):
+        return True
+    if any(part.python_only for _, part in one.loop.each()) or _written(one) != _written(other):
+        return False
+    _PROVEN[words] = _PROVEN.get(words, set()) | differ
+    return True
+
+
+def _written(batch: Batch) -> list[Any]:
+    """All that a loop's trace computes, as values that can be compared."""
+    sections = trace(batch).sections
+    return [
+        (
+            [repr(term) for term in section.tape.terms],
+            [(pointer, row, term.index) for pointer, row, term in section.writes],
+            [term.index for term in section.signals],
+        )
+        for section in sections
+    ]
 
 
 def _symbols(tape: Tape, kind: str, record: Any) -> Any:

@@ -167,9 +167,9 @@ class _Block:
             return
         k = 0
         while k < steps:
-            wanted = (first + k) % every == 0
-            until = k + 1 if wanted else min(steps, k + every - (first + k) % every)
-            if wanted:
+            due = (first + k) % every == 0
+            until = k + 1 if due else min(steps, k + every - (first + k) % every)
+            if due:
                 self._record(first + k, shared[k:until])
             else:
                 self._call(common.quiet, shared[k:until])

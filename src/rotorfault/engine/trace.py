@@ -1,8 +1,8 @@
 """Terms: the symbols on which the closed loop is run once, so that only its arithmetic is kept.
 
-A `Term` carries + - * / and the functions of `rotorfault.maths.scalar`. Equal operations on equal arguments are the same
-term, so what several equations share is computed once. Each term knows its *level*: 0 a number, 1 a function of the
-flight's parameters alone, 2 anything that changes during a flight. Terms of level 1 are computed once per flight,
+A `Term` carries + - * / and the functions of `rotorfault.maths.scalar`. Equal operations on equal arguments are the
+same term, so what several equations share is computed once. Each term knows its *level*: 0 a number, 1 a function of
+the flight's parameters alone, 2 anything that changes during a flight. Terms of level 1 are computed once per flight,
 before it begins (see `rotorfault.engine.program`).
 
 A division by a parameter becomes a multiplication by its reciprocal; against plain floats that differs by rounding
@@ -41,16 +41,16 @@ class Tape:
 
     def __init__(self) -> None:
         self.terms: list[Term] = []
-        self._known: dict[tuple[Any, ...], Term] = {}
+        self._by_key: dict[tuple[Any, ...], Term] = {}
 
     def term(self, op: str, *args: Any) -> Term:
         """The term of this operation on these arguments (terms; for leaves, numbers)."""
         key = (op, *(arg.index if isinstance(arg, Term) else arg for arg in args))
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = Term(self, len(self.terms), op, args)
-            self.terms.append(found)
-        return found
+        term = self._by_key.get(key)
+        if term is None:
+            term = self._by_key[key] = Term(self, len(self.terms), op, args)
+            self.terms.append(term)
+        return term
 
     def constant(self, value: float) -> Term:
         """The term of a number; 0.0 and -0.0 are two."""
@@ -228,8 +228,8 @@ def function(name: str, *arguments: Operand) -> Term:
 def _of_an_arc_tangent(name: str, y: Term, x: Term) -> Term:
     """Sine or cosine of the angle of the point (x, y): a leg of the triangle over its hypotenuse.
 
-    Attitudes are taken apart into angles by who measures and put together again by who controls; with perfect sensors
-    nothing of that need be computed.
+    Sensors split attitudes into angles, and controllers join them again; with ideal sensors nothing of that need be
+    computed.
     """
     square = x * x + y * y
     at_origin = less_equal(square, 0.0)  # not at NaN, which must come through

@@ -17,7 +17,7 @@ from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
 from rotorfault.engine.batch import Array, Batch, columns
 from rotorfault.engine.noise import Stream, normals
-from rotorfault.engine.structure import structure
+from rotorfault.engine.program import same_code
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
 from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.geometry import Vec3
@@ -115,7 +115,7 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
     batches = [assemble(scenario) for scenario in scenarios]
     first = batches[0]
     for batch, scenario in zip(batches[1:], scenarios[1:], strict=True):
-        same = structure(batch.loop) == structure(first.loop) and batch.every == first.every
+        same = same_code(first, batch) and batch.every == first.every
         if not same or not np.array_equal(batch.reference, first.reference):
             raise InputError(
                 f"scenario '{scenario.name}' differs from the first in more than numbers (parts, options, length or "

@@ -294,7 +294,7 @@ class Scoring:
     @staticmethod
     def _signal(signal: Signal, old: Scalar, signals: Any, first: Scalar) -> Scalar:
         """What is counted of one signal after this instant."""
-        value = signals
+        value = signals.parts if "." in signal.name else signals
         for name in signal.name.split("."):
             value = getattr(value, name)
         leaves = flatten(value)

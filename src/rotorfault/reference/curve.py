@@ -29,8 +29,8 @@ class Curve:
         if rates is None:
             curve = CubicSpline(times, values)
         else:
-            given = [values, rates] if accelerations is None else [values, rates, accelerations]
-            curve = BPoly.from_derivatives(times, np.stack(given, axis=1))
+            columns = [values, rates] if accelerations is None else [values, rates, accelerations]
+            curve = BPoly.from_derivatives(times, np.stack(columns, axis=1))
         self._derivatives = [curve, curve.derivative(1), curve.derivative(2)]
 
     def evaluate(self, times: Array) -> Array:

@@ -65,8 +65,8 @@ def error_figure(columns: Sequence[Column], colours: Mapping[str, str]) -> Figur
 
 def _fates(column: Column, labels: Sequence[str]) -> list[str]:
     """A line for each flight of a column that was lost."""
-    found = [(label, column.summaries[label]) for label in labels if label in column.summaries]
-    return [f"{label} {s['outcome']} at {s['end_time']:.3g} s" for label, s in found if not s["survived"]]
+    flights = [(label, column.summaries[label]) for label in labels if label in column.summaries]
+    return [f"{label} {s['outcome']} at {s['end_time']:.3g} s" for label, s in flights if not s["survived"]]
 
 
 def _scale(axes: Axes, values: Sequence[float | None]) -> None:
@@ -115,8 +115,8 @@ def _ratio(column: Column, key: str, name: str, labels: Sequence[str]) -> str:
     """What stands under an axis' name: the ratio of the second flight's error to the first's, or a dash."""
     if len(labels) != 2:
         return ""
-    found = [column.summaries.get(label) for label in labels]
-    if any(summary is None or not summary["survived"] for summary in found):
+    summaries = [column.summaries.get(label) for label in labels]
+    if any(summary is None or not summary["survived"] for summary in summaries):
         return "\n–"
-    first, second = (summary[key][name] for summary in found if summary is not None)
+    first, second = (summary[key][name] for summary in summaries if summary is not None)
     return f"\n{number(second / first)}" if first and second is not None else "\n–"

@@ -51,7 +51,7 @@ def draw(data: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     Parameters
     ----------
     data : Dataset or mapping of str to Dataset
-        Flights as `rotorfault.results.dataset.dataset` makes them; the keys of a mapping stand in the legends.
+        `Flight.data` of one flight or several; the keys of a mapping stand in the legends.
 
     Returns
     -------
@@ -66,10 +66,10 @@ def draw(data: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     """
     drawn = flights(data)
     with rc_context(STYLE):
-        made = {name: make(drawn) for name, make in FIGURES.items()}
+        figures = {name: make(drawn) for name, make in FIGURES.items()}
         if (window := detail(drawn)) is not None:
-            made["control_detail"] = _control(drawn, window)
-    return made
+            figures["control_detail"] = _control(drawn, window)
+    return figures
 
 
 def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[str] = ("png",)) -> list[Path]:
@@ -215,18 +215,18 @@ def _control(drawn: Sequence[Drawn], window: tuple[float, float] | None = None) 
 def _logarithmic(axes: Axes, drawn: Sequence[Drawn]) -> None:
     """V on a log scale over at most `DECADES`; a V of zero throughout is said in words."""
     values = [flight.values("controller.lyapunov") for flight in drawn]
-    found = span([value[value > 0.0] for value in values])
-    if found is None:
+    extent = span([value[value > 0.0] for value in values])
+    if extent is None:
         if span(values) is not None:
             axes.text(0.5, 0.6, "V = 0", transform=axes.transAxes, ha="center")
         return
     axes.set_yscale("log", nonpositive="mask")
     # A flight that is lost may reach up as far as it likes, but not push the others out of sight.
-    calm = span([v[v > 0.0] for f, v in zip(drawn, values, strict=True) if not f.fate]) or found
-    axes.set_ylim(max(calm[0], calm[1] * 10.0**-DECADES) / 2.0, found[1] * 3.0)
+    calm = span([v[v > 0.0] for f, v in zip(drawn, values, strict=True) if not f.fate]) or extent
+    axes.set_ylim(max(calm[0], calm[1] * 10.0**-DECADES) / 2.0, extent[1] * 3.0)
     keep_ends_inside(axes)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    if found[1] > 100.0 * found[0]:
+    if extent[1] > 100.0 * extent[0]:
         axes.yaxis.set_minor_formatter(NullFormatter())
 
 

@@ -207,8 +207,8 @@ def _core(panel: Panel, drawn: Sequence[Drawn], window: tuple[float, float]) -> 
 def _agree(drawn: Sequence[Drawn], curve: Curve) -> bool:
     """Whether a curve is the same in all flights while all fly."""
     shortest = min(drawn, key=lambda flight: flight.end)
-    seen = [np.interp(shortest.time, f.time, f.values(curve.signal, curve.column)) for f in drawn]
-    return all(np.allclose(seen[0], other, rtol=1e-6, atol=1e-9, equal_nan=True) for other in seen[1:])
+    curves = [np.interp(shortest.time, f.time, f.values(curve.signal, curve.column)) for f in drawn]
+    return all(np.allclose(curves[0], other, rtol=1e-6, atol=1e-9, equal_nan=True) for other in curves[1:])
 
 
 def _darker(colour: str) -> tuple[float, float, float]:
@@ -267,21 +267,21 @@ def mark_onsets(axes: Axes, drawn: Sequence[Drawn], window: tuple[float, float])
 
 def onset_label(drawn: Sequence[Drawn]) -> str | None:
     """What the legend says about the fault onsets; None if there are none."""
-    found = {tuple(sorted(flight.onsets.items())) for flight in drawn if flight.onsets}
-    if not found:
+    onsets = {tuple(sorted(flight.onsets.items())) for flight in drawn if flight.onsets}
+    if not onsets:
         return None
-    if len(found) > 1:
+    if len(onsets) > 1:
         return "fault onset"
     times: dict[float, list[int]] = {}
-    for rotor, time in found.pop():
+    for rotor, time in onsets.pop():
         times.setdefault(time, []).append(rotor)
     if len(times) > 2:
         return "fault onset"
-    told = (
+    faults = (
         f"rotor{'s' if len(rotors) > 1 else ''} {', '.join(map(str, rotors))} at {time:.4g} s"
         for time, rotors in times.items()
     )
-    return f"fault onset ({'; '.join(told)})"
+    return f"fault onset ({'; '.join(faults)})"
 
 
 def whole(drawn: Sequence[Drawn]) -> tuple[float, float]:
@@ -378,9 +378,9 @@ def legend(
         handles.append(sample(text, **END | {"color": drawn[0].colour if len(drawn) == 1 else GREY}))
     for columns in range(len(handles), 0, -1):
         rows = math.ceil(len(handles) / columns)
-        made = figure.legend(handles=handles, loc="outside upper center", ncols=math.ceil(len(handles) / rows))
-        extent = made.get_window_extent()
+        box = figure.legend(handles=handles, loc="outside upper center", ncols=math.ceil(len(handles) / rows))
+        extent = box.get_window_extent()
         if columns == 1 or extent.width < ROOM * figure.bbox.width:
             break
-        made.remove()
+        box.remove()
     return 1.0 - 1.5 * float(extent.height / figure.bbox.height)

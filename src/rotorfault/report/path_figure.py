@@ -31,16 +31,17 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
         path = flight.values("position")
         outside = np.any((path < low) | (path > high), axis=1)
         kept = np.unique(np.concatenate([extremes(path[:, k]) for k in range(3)]))
-        seen = np.where(np.asarray(outside)[:, None], np.nan, path)
-        axes.plot(*seen[kept].T, color=flight.colour, linestyle=flight.line, linewidth=flight.width, zorder=4)
+        visible = np.where(np.asarray(outside)[:, None], np.nan, path)
+        axes.plot(*visible[kept].T, color=flight.colour, linestyle=flight.line, linewidth=flight.width, zorder=4)
         # A shadow on the floor tells how deep the path lies.
-        axes.plot(seen[kept, 0], seen[kept, 1], low[2], color="0.8", linewidth=0.7, zorder=1)
-        axes.plot(*seen[:1].T, **START, markeredgecolor=flight.colour, zorder=6)
+        axes.plot(visible[kept, 0], visible[kept, 1], low[2], color="0.8", linewidth=0.7, zorder=1)
+        axes.plot(*visible[:1].T, **START, markeredgecolor=flight.colour, zorder=6)
         for time in sorted(set(flight.onsets.values())):
-            at = seen[int(np.searchsorted(flight.time, time))]
-            axes.plot(*at[:, None], **FAULT, markerfacecolor=flight.colour, zorder=7)
+            # Between the last record and the end of the flight there is no place to mark.
+            at = visible[int(np.searchsorted(flight.time, time)) :][:1]
+            axes.plot(*at.T, **FAULT, markerfacecolor=flight.colour, zorder=7)
         if flight.fate:
-            axes.plot(*seen[-1:].T, **END, color=flight.colour, zorder=7)
+            axes.plot(*visible[-1:].T, **END, color=flight.colour, zorder=7)
     others = _targets(axes, drawn)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low)
@@ -70,8 +71,10 @@ def _fill(figure: Figure, axes: Any, aspect: Array, top: float) -> None:
         axes.set_box_aspect(aspect, zoom=zoom)
         axes.set_position([*(middle - size / 2.0), *size])
         figure.draw_without_rendering()
-        seen = Bbox.union([axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)] + [_corners(axes)])
-        low, high = figure.transFigure.inverted().transform(seen.get_points())
+        extent = Bbox.union(
+            [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)] + [_corners(axes)]
+        )
+        low, high = figure.transFigure.inverted().transform(extent.get_points())
         zoom *= float(min(EDGE / (high - low)[0], EDGE * top / (high - low)[1]))
         middle += np.array([0.5, top / 2.0]) - 0.5 * (low + high)
     axes.set_position([*(middle - size / 2.0), *size])
@@ -80,8 +83,8 @@ def _fill(figure: Figure, axes: Any, aspect: Array, top: float) -> None:
 def _corners(axes: Any) -> Bbox:
     corners = np.array([*product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), [1.0])])
     x, y, _, w = axes.get_proj() @ corners.T
-    seen = axes.transData.transform(np.column_stack([x / w, y / w]))
-    return Bbox([seen.min(axis=0), seen.max(axis=0)])
+    pixels = axes.transData.transform(np.column_stack([x / w, y / w]))
+    return Bbox([pixels.min(axis=0), pixels.max(axis=0)])
 
 
 def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
@@ -89,11 +92,11 @@ def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
     low, high = np.zeros(3), np.zeros(3)
     reach = 10.0 if len(drawn) == 1 else 3.0
     targets, starts = [f.values("position_reference") for f in drawn], [f.values("position")[:1] for f in drawn]
-    wanted = np.concatenate(targets + starts)
-    size = max(float(np.ptp(wanted, axis=0).max()), 1.0)
+    core = np.concatenate(targets + starts)
+    size = max(float(np.ptp(core, axis=0).max()), 1.0)
     for k in range(3):
-        least, most = span([f.values("position", k) for f in drawn] + [wanted[:, k]]) or (0.0, 0.0)
-        least, most = max(least, wanted[:, k].min() - reach * size), min(most, wanted[:, k].max() + reach * size)
+        least, most = span([f.values("position", k) for f in drawn] + [core[:, k]]) or (0.0, 0.0)
+        least, most = max(least, core[:, k].min() - reach * size), min(most, core[:, k].max() + reach * size)
         low[k], high[k] = least, most
     # A path in a plane still gets a box with some depth.
     spare = np.maximum(0.3 * (high - low).max() - (high - low), 0.0) / 2.0 + 0.04 * (high - low).max()
@@ -113,18 +116,18 @@ def _once(path: Array) -> Array:
 def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
     """Draw where the flights were to go: a path where the reference moves, a star where it ends."""
     handles: list[Any] = []
-    told: set[str] = set()
+    names: set[str] = set()
     for flight in drawn:
-        wanted = flight.values("position_reference")
-        if np.ptp(wanted, axis=0).max() > 1e-9:
-            wanted = _once(wanted)
-            kept = np.unique(np.concatenate([extremes(wanted[:, k]) for k in range(3)]))
-            axes.plot(*wanted[kept].T, **REFERENCE, zorder=5)
+        path = flight.values("position_reference")
+        if np.ptp(path, axis=0).max() > 1e-9:
+            path = _once(path)
+            kept = np.unique(np.concatenate([extremes(path[:, k]) for k in range(3)]))
+            axes.plot(*path[kept].T, **REFERENCE, zorder=5)
             name, style = "reference", REFERENCE
         else:
-            axes.plot(*wanted[-1:].T, **TARGET, zorder=5)
+            axes.plot(*path[-1:].T, **TARGET, zorder=5)
             name, style = "target", TARGET
-        if name not in told:
-            told.add(name)
+        if name not in names:
+            names.add(name)
             handles.append(sample(name, **style))
     return handles

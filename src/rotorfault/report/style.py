@@ -104,8 +104,8 @@ def extremes(values: Array, buckets: int = BUCKETS) -> NDArray[np.intp]:
     if len(edges) > buckets:
         edges = edges[:0]
     ends = [0, len(values) - 1]
-    found = np.unique(np.concatenate([first + low, first + high, edges, edges + 1, ends]))
-    return found[found < len(values)].astype(np.intp)
+    indices = np.unique(np.concatenate([first + low, first + high, edges, edges + 1, ends]))
+    return indices[indices < len(values)].astype(np.intp)
 
 
 def span(parts: Iterable[Array]) -> tuple[float, float] | None:

@@ -1,7 +1,7 @@
 """Scenarios: everything that defines a flight, as TOML or from Python, checked once.
 
 A scenario names parts by their ``kind`` (``[wind] kind = "constant"``); the other keys of such a table are the
-settings of that part. Built-in scenarios are in ``rotorfault/scenarios``; ``rotorfault new scenario`` writes a
+settings of that part. Built-in scenarios are in ``scenario/builtin``; ``rotorfault new scenario`` writes a
 commented one to start from.
 """
 
@@ -225,11 +225,11 @@ def scenario_fields() -> dict[str, Any]:
 
 
 def named_places(overrides: Mapping[str, Any]) -> frozenset[str]:
-    """Places of code that a user has named himself, among values in place of a scenario's, or in tables of them."""
+    """Places of code that a user has named himself, anywhere among values in place of a scenario's."""
 
     def places(value: Any) -> Iterator[str]:
-        if isinstance(value, str) and is_place(value):
-            yield value
+        if isinstance(value, str):
+            yield from (value,) if is_place(value) else ()
         elif isinstance(value, (Mapping, list, tuple)):
             for inner in value.values() if isinstance(value, Mapping) else value:
                 yield from places(inner)

@@ -33,8 +33,8 @@ from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
 
-# Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many does
-# not hide what the others are worth.
+# Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many
+# does not hide what the others are worth.
 LOST = 10.0
 # Of the time of the fault, for a flight that had not settled by then: more would ask for settling before the fault at
 # any price, less would reward those that wait for it.
@@ -111,11 +111,14 @@ def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -
     worth = _settling(error, times, onset, k) if tracking is None else tracking * float(np.sqrt(np.mean(error**2)))
     wrong = np.abs(flags[-1] - _FAULTY).sum() + flags[:k].max(axis=0, initial=0.0).sum()
     wrong += flags[k:, [1, 3]].max(axis=0, initial=0.0).sum()
-    virtual = data["controller.virtual_attitude"].values
+    # What the cascade asks of the attitude; other controllers ask for a torque.
+    known = "controller.virtual_attitude" in data
+    virtual = data["controller.virtual_attitude" if known else "torque_demand"].values
+    virtual = virtual if known else virtual / np.array([*scenario.vehicle.vehicle.inertia])
     return float(
         worth
         + float(wrong)
-        + COST_WEIGHT * math.log10(1.0 + scores["cost"])
+        + (COST_WEIGHT * math.log10(1.0 + scores["cost"]) if "controller.virtual_position" in data else 0.0)
         + max(0.0, float(scores["tilt_max"]) - TILT_FREE)
         + EFFORT_WEIGHT * math.log10(1.0 + float(np.mean(virtual**2)))
     )

@@ -101,18 +101,35 @@ def test_what_is_no_number_decides_nothing() -> None:
 
 
 @given(
-    st.lists(st.floats(-5.0, 5.0), min_size=4, max_size=4),
-    st.lists(st.floats(0.0, 9.0), min_size=4, max_size=4),
+    st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
+    st.lists(st.floats(0.05, 1.0), min_size=4, max_size=4),
     st.floats(-3.0, 3.0),
+    st.integers(0, 3),
 )
-def test_relative_loss(residual: list[float], thrust: list[float], common: float) -> None:
+def test_relative_loss_is_what_was_lost(losses: list[float], shares: list[float], common: float, sound: int) -> None:
+    """Each rotor misses its share of its own thrust; all four alike are off by a wind, and one rotor is sound."""
+    true = np.insert(losses, sound, 0.0)
+    thrust = np.array(shares) * VEHICLE.thrust_max
+    residual = common - true * thrust
+    found = arr(relative_loss(PerRotor(*residual), PerRotor(*thrust), VEHICLE))
+    np.testing.assert_allclose(found, true, atol=1e-12)
+
+
+@given(st.lists(st.floats(-5.0, 5.0), min_size=4, max_size=4), st.lists(st.floats(0.0, 9.0), min_size=4, max_size=4))
+def test_relative_loss_is_a_share_and_the_best_rotor_has_none(residual: list[float], thrust: list[float]) -> None:
     found = arr(relative_loss(PerRotor(*residual), PerRotor(*thrust), VEHICLE))
     assert ((found >= 0.0) & (found <= 1.0)).all()
-    assert found[int(np.argmax(residual))] == 0.0  # the best is never blamed
-    expected = (max(residual) - np.array(residual)) / np.maximum(thrust, 0.05 * VEHICLE.thrust_max)
-    np.testing.assert_allclose(found, np.clip(expected, 0.0, 1.0), atol=1e-12)
-    shifted = relative_loss(PerRotor(*(r + common for r in residual)), PerRotor(*thrust), VEHICLE)
-    np.testing.assert_allclose(arr(shifted), found, atol=1e-12)
+    assert found[int(np.argmax(residual))] == 0.0
+    # Of two rotors that pull alike, the one that misses more has lost more.
+    alike = arr(relative_loss(PerRotor(*residual), PerRotor.all(5.0), VEHICLE))
+    assert (np.diff(alike[np.argsort(residual)]) <= 0.0).all()
+
+
+def test_a_rotor_that_hardly_pulls_is_measured_against_a_twentieth_of_full_thrust() -> None:
+    least = 0.05 * VEHICLE.thrust_max
+    residual = PerRotor(0.0, -0.5 * least, -0.5 * least, -0.5 * least)
+    found = arr(relative_loss(residual, PerRotor(0.0, 0.0, least, 2.0 * least), VEHICLE))
+    np.testing.assert_allclose(found, [0.0, 0.5, 0.5, 0.25], atol=1e-12)
 
 
 def asked_of(share: float, level: float, thrust: PerRotor, before: PerRotor | None = None) -> bool:

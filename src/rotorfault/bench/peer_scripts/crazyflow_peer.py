@@ -95,14 +95,14 @@ def end_of_flight(integrator: str, frequency: int) -> np.ndarray:
     return end
 
 
-def accuracy(known: Callable[[str], common.Speed], effort: common.Effort) -> tuple[list[dict[str, Any]], float]:
+def accuracy(speed_of: Callable[[str], common.Speed], effort: common.Effort) -> tuple[list[dict[str, Any]], float]:
     """Error of each step against crazyflow's own dynamics, and the error of that truth."""
     ends = {}
     for integrator in ("euler", "rk4"):
         for frequency in (500, 1_000, 2_000, 4_000):
             ends[integrator, frequency] = end_of_flight(integrator, frequency)
     speeds = {
-        key: known(key[0]) if key[1] == FREQUENCY else throughput(common.SIZES[-1], key[0], effort, key[1])
+        key: speed_of(key[0]) if key[1] == FREQUENCY else throughput(common.SIZES[-1], key[0], effort, key[1])
         for key in ends
     }
     jax.config.update("jax_enable_x64", True)
@@ -137,11 +137,11 @@ def main() -> None:
     result = {"version": version("crazyflow"), **settings["rk4"], "variants": {"euler": settings["euler"]}}
     if task.whole:
 
-        def known(integrator: str) -> common.Speed:
+        def speed_of(integrator: str) -> common.Speed:
             return common.headline(settings[integrator])
 
         effort = task.effort._replace(repeats=3)
-        result["accuracy"], result["truth_error_m"] = accuracy(known, effort)
+        result["accuracy"], result["truth_error_m"] = accuracy(speed_of, effort)
     result["note"] = (
         f"JAX {jax.__version__}. The manoeuvre is a closed-loop flight along a smooth path; its truth is the same "
         f"simulation in float64 with RK4 at {TRUTH_FREQUENCY} Hz, its controllers sampled at the same times."

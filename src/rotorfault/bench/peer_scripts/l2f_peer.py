@@ -57,11 +57,11 @@ def changed(step: float) -> Any:
     device, env, parameters = l2f.Device(), l2f.Environment(), l2f.Parameters()
     l2f.initialize_environment(device, env)
     l2f.initial_parameters(device, env, parameters)
-    l2f.parameters_from_json(device, env, json.dumps(given(step)), parameters)
+    l2f.parameters_from_json(device, env, json.dumps(parameters_at(step)), parameters)
     return parameters
 
 
-def given(step: float) -> dict[str, Any]:
+def parameters_at(step: float) -> dict[str, Any]:
     """The parameters as numbers; its JSON prints six decimals, too few for the inertia, which its inverse gives."""
     device, env, parameters = l2f.Device(), l2f.Environment(), l2f.Parameters()
     l2f.initialize_environment(device, env)
@@ -81,7 +81,9 @@ class Model:
     """l2f's published equations of motion in float64, of one vehicle: state p, q (w first), v, omega, rotors."""
 
     def __init__(self) -> None:
-        d = {key: np.array(value) for key, value in given(PERIOD)["dynamics"].items() if key != "action_limit"}
+        d = {
+            key: np.array(value) for key, value in parameters_at(PERIOD)["dynamics"].items() if key != "action_limit"
+        }
         yaw = d["rotor_torque_directions"] * d["rotor_torque_constants"][:, None]
         self.to_force = d["rotor_thrust_directions"].T
         self.to_torque = (yaw + np.cross(d["rotor_positions"], d["rotor_thrust_directions"])).T

@@ -59,8 +59,8 @@ def task() -> Task:
     parser.add_argument("--json", type=Path, required=True)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--cores", type=int, default=1)
-    given = parser.parse_args()
-    return Task(given.json, QUICK if given.quick else FULL, given.cores)
+    options = parser.parse_args()
+    return Task(options.json, QUICK if options.quick else FULL, options.cores)
 
 
 def rate(advance: Callable[[], object], steps: int, effort: Effort) -> Speed:

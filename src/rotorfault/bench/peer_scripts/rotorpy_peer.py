@@ -21,8 +21,8 @@ DEVICE = torch.device("cpu")
 def flat_output(t: float) -> dict[str, Any]:
     """The path at time t in s, as RotorPy's controllers take it."""
     position, velocity, acceleration = common.reference(t)
-    given = [np.array(position), np.array(velocity), np.array(acceleration), np.zeros(3), np.zeros(3)]
-    return {**dict(zip(FLAT_KEYS, given, strict=True)), "yaw": 0.0, "yaw_dot": 0.0, "yaw_ddot": 0.0}
+    values = [np.array(position), np.array(velocity), np.array(acceleration), np.zeros(3), np.zeros(3)]
+    return {**dict(zip(FLAT_KEYS, values, strict=True)), "yaw": 0.0, "yaw_dot": 0.0, "yaw_ddot": 0.0}
 
 
 def start() -> dict[str, np.ndarray]:

@@ -270,8 +270,8 @@ def _worth(
         ("cost", lambda r: r.summary["cost"]),
         ("command variation", _notable_variation),
     ):
-        known = [(value(a), value(b)) for a, b in alive]
-        each = [a / b for a, b in known if a is not None and b is not None and b > 0.0]
+        numbers = [(value(a), value(b)) for a, b in alive]
+        each = [a / b for a, b in numbers if a is not None and b is not None and b > 0.0]
         if each:
             ratios.append(f"{name} {np.median(each):.2f} ({min(each):.2g} to {max(each):.2g})")
     return f"{line}; where both do, ratio (median, range): {', '.join(ratios)}." if ratios else f"{line}."

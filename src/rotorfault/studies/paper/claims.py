@@ -54,8 +54,8 @@ def _fine(case: str, controller: str, *, sgn: bool = False, preset: str | None =
 @lru_cache(maxsize=1)
 def rules() -> tuple[Rule, ...]:
     """All rules in the order of their numbers."""
-    given = (*_costs(), *_settling(), *_errors(), *_chattering(), *wind_sweep.rules(), *_faults(), *_ranges())
-    return tuple(sorted((*given, *_attitude(), *_sliding(), *_others()), key=lambda rule: _order(rule.id)))
+    first = (*_costs(), *_settling(), *_errors(), *_chattering(), *wind_sweep.rules(), *_faults(), *_ranges())
+    return tuple(sorted((*first, *_attitude(), *_sliding(), *_others()), key=lambda rule: _order(rule.id)))
 
 
 def _order(name: str) -> tuple[int, str]:
@@ -120,23 +120,23 @@ def _settling() -> list[Rule]:
 
 
 def _errors() -> list[Rule]:
-    found = []
+    entries = []
     for case in CASES.values():
         for period in case.periods:
             extra = (_matched(case.id),) if period == 0.001 else ()
-            told = "10 ms is ours" if case.id == "square" and period == 0.01 else f"figure {_MSE_FIGURE[case.id]}"
-            found.append(
+            source = "10 ms is ours" if case.id == "square" and period == 0.01 else f"figure {_MSE_FIGURE[case.id]}"
+            entries.append(
                 Rule(
                     f"3.{case.id}.{1000 * period:g}ms",
                     f"ROISMC's mean square errors lie below SMC's ({case.title.lower()}, T_s = {1000 * period:g} ms)",
-                    f"lower ({told})",
+                    f"lower ({source})",
                     "m^2",
                     "sum of x, y, z mean square errors lower, and most of the six coordinates ('in most cases')",
                     (_main(case.id, "roismc", period), _main(case.id, "smc", period), *extra),
                     judges.errors,
                 )
             )
-    return found
+    return entries
 
 
 _MSE_FIGURE = {"set-point": 7, "sinusoid": 11, "square": 16}
@@ -180,21 +180,21 @@ def _faults() -> list[Rule]:
 
 def _ranges() -> list[Rule]:
     why = "range (largest less least over the flight, worst rotor) at least 5 % below SMC's"
-    found = [
+    entries = [
         Rule(
             "7a", "Rotor speeds stay in a smaller range (case 1)", "reduced (figure 5)", "rad/s", why,
             (*_pair("set-point"), _matched("set-point")), judges.range_of("rotor_speed"),
         )
     ]  # fmt: skip
     for letter, case in (("b", "set-point"), ("c", "square")):
-        found.append(
+        entries.append(
             Rule(
                 f"7{letter}", f"The range of control inputs is smaller ({CASES[case].title.lower()})",
                 "greatly decreased (no number)", "N", f"rotor commands: {why}",
                 (*_pair(case), _matched(case)), judges.range_of("control"),
             )
         )  # fmt: skip
-    return found
+    return entries
 
 
 def _attitude() -> list[Rule]:
@@ -264,7 +264,7 @@ def _others() -> list[Rule]:
         Rule(
             "14", "Gusts disturb travel and elevation (x and z, case 3)", "affected (no number)", "1",
             "mean square errors of x and z at least 10 % above those of the same flight in still air",
-            (square, calm), judges.gusts_seen,
+            (square, calm), judges.gust_effect,
         ),
         Rule(
             "15", "Accurate tracking of all references in wind and with faults", "accurate (no number)", "",

@@ -139,19 +139,19 @@ def draw_all(results: Mapping[str, Result]) -> dict[str, Figure]:
     """
     drawn = {case: _flights(results, case) for case in CASES}
     with rc_context(STYLE):
-        made = {"fig01": layout_figure(load_scenario(CASES["set-point"].scenario).vehicle)}
+        figures = {"fig01": layout_figure(load_scenario(CASES["set-point"].scenario).vehicle)}
         for key, figure in _FIGURES.items():
             if isinstance(figure, _InTime) and drawn[figure.case]:
-                made[key] = figure.make(drawn[figure.case])
+                figures[key] = figure.make(drawn[figure.case])
             elif isinstance(figure, _Errors) and (columns := _columns(results, figure.case)):
-                made[key] = error_figure(columns, COLOURS)
-    return made
+                figures[key] = error_figure(columns, COLOURS)
+    return figures
 
 
 def _flights(results: Mapping[str, Result], case: str) -> list[Drawn]:
     """A case's flights at 1 ms, SMC first."""
-    found = {NAMES[c]: results[i].data() for c in CONTROLLERS if (i := run_of(case, c, period=SHOWN).id) in results}
-    return [flight._replace(colour=COLOURS[flight.label]) for flight in flights(found)] if found else []
+    data = {NAMES[c]: results[i].data() for c in CONTROLLERS if (i := run_of(case, c, period=SHOWN).id) in results}
+    return [flight._replace(colour=COLOURS[flight.label]) for flight in flights(data)] if data else []
 
 
 def _columns(results: Mapping[str, Result], case: str) -> list[Column]:

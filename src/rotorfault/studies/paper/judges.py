@@ -25,10 +25,10 @@ def cost(ours: Result, theirs: Result, matched: Result) -> list[Reading]:
         value = result.summary["cost"]
         return None if value is None else float(value)
 
-    found = lower("", ours, theirs, own) + lower(MATCHED, ours, matched, own)
+    readings = lower("", ours, theirs, own) + lower(MATCHED, ours, matched, own)
     for name in COST_READINGS:
-        found += lower(name, ours, theirs, extra("cost_readings", name))
-    return _once(found)
+        readings += lower(name, ours, theirs, extra("cost_readings", name))
+    return _once(readings)
 
 
 def _once(readings: Sequence[Reading]) -> list[Reading]:
@@ -41,8 +41,8 @@ def settled_within(limit: float) -> Callable[[Result], list[Reading]]:
 
     def judge(ours: Result) -> list[Reading]:
         value = ours.summary["settle_time"]["overall"]
-        told = f"{text(value)} s" if survived(ours) else fate(ours)
-        return [Reading("", told, value is not None and value < limit)]
+        measured = f"{text(value)} s" if survived(ours) else fate(ours)
+        return [Reading("", measured, value is not None and value < limit)]
 
     return judge
 
@@ -50,14 +50,14 @@ def settled_within(limit: float) -> Callable[[Result], list[Reading]]:
 def residual(angles: Sequence[int], paper: Sequence[float], names: Sequence[str]) -> Callable[..., list[Reading]]:
     """Residual angles within a factor of the paper's; one flight per reading, in the order of `names`."""
 
-    def judge(*flown: Result) -> list[Reading]:
-        found = []
-        for name, result in zip(names, flown, strict=True):
+    def judge(*results: Result) -> list[Reading]:
+        readings = []
+        for name, result in zip(names, results, strict=True):
             values = [abs(result.extra["attitude_end"][angle]) for angle in angles]
             near = all(p / SAME <= v <= p * SAME for v, p in zip(values, paper, strict=True))
-            told = ", ".join(f"{value:.4f}" for value in values) if survived(result) else fate(result)
-            found.append(Reading(name, told, survived(result) and near))
-        return found
+            measured = ", ".join(f"{value:.4f}" for value in values) if survived(result) else fate(result)
+            readings.append(Reading(name, measured, survived(result) and near))
+        return readings
 
     return judge
 
@@ -74,14 +74,14 @@ def errors(ours: Result, theirs: Result, *matched: Result) -> list[Reading]:
             first, second = (result.summary.get(kind) or result.extra[kind] for result in (ours, other))
             pairs += [(first[a], second[a]) for a in ANGLES]
         below = sum(a < b for a, b in pairs)
-        told = f"{whole[0].measured} m^2; lower on {below} of {len(pairs)} coordinates"
-        return [Reading(name, told, whole[0].holds and 2 * below > len(pairs))]
+        measured = f"{whole[0].measured} m^2; lower on {below} of {len(pairs)} coordinates"
+        return [Reading(name, measured, whole[0].holds and 2 * below > len(pairs))]
 
-    found = judged("", theirs, "attitude_mse") + judged("position axes only", theirs, "")
-    found += judged("angles against the demand", theirs, "attitude_demand_mse")
+    readings = judged("", theirs, "attitude_mse") + judged("position axes only", theirs, "")
+    readings += judged("angles against the demand", theirs, "attitude_demand_mse")
     for other in matched:
-        found += judged(MATCHED, other, "attitude_mse")
-    return _once(found)
+        readings += judged(MATCHED, other, "attitude_mse")
+    return _once(readings)
 
 
 def smooth(ours: Result, scale: Result) -> list[Reading]:
@@ -92,10 +92,10 @@ def smooth(ours: Result, scale: Result) -> list[Reading]:
     if share is None or variation is None:
         return [Reading("", "flight too short", False)]
     band = ours.extra["chattering"]["band"]
-    told = f"{100.0 * share:.2g} % of power above {band[0]:.3g} Hz, total variation {variation:.3g} N/s per rotor"
+    measured = f"{100.0 * share:.2g} % of power above {band[0]:.3g} Hz, total variation {variation:.3g} N/s per rotor"
     most = _variation(scale) if survived(scale) else None
-    told += f" (discontinuous: {text(most) + ' N/s' if most is not None else fate(scale)})"
-    return [Reading("", told, share < CHATTER_SHARE and (most is None or variation < CHATTER_SCALE * most))]
+    measured += f" (discontinuous: {text(most) + ' N/s' if most is not None else fate(scale)})"
+    return [Reading("", measured, share < CHATTER_SHARE and (most is None or variation < CHATTER_SCALE * most))]
 
 
 _variation = extra("chattering", "steady_total_variation")
@@ -110,20 +110,22 @@ def less_chattering(ours: Result, theirs: Result, sgn: Result) -> list[Reading]:
     ]
 
 
-def detected(*flown: Result) -> list[Reading]:
+def detected(*results: Result) -> list[Reading]:
     """Claim 6: both faulty rotors flagged, no other, losses right within 0.05, and flight goes on."""
     parts, holds = [], True
-    for result in flown:
-        found = result.summary["detections"]
-        delays = [d["delay"] for d in found]
-        gaps = [None if d["loss_estimated"] is None else abs(d["loss_estimated"] - d["loss_true"]) for d in found]
-        right = {d["rotor"] for d in found} == {1, 3} and None not in delays
+    for result in results:
+        detections = result.summary["detections"]
+        delays = [d["delay"] for d in detections]
+        gaps = [
+            None if d["loss_estimated"] is None else abs(d["loss_estimated"] - d["loss_true"]) for d in detections
+        ]
+        right = {d["rotor"] for d in detections} == {1, 3} and None not in delays
         right = right and all(gap is not None and gap <= 0.05 for gap in gaps)
         right = right and result.summary["false_alarms"] == 0 and survived(result)
         after = "/".join("never" if delay is None else f"{1e3 * delay:.0f}" for delay in delays)
         error = max((gap for gap in gaps if gap is not None), default=None)
-        told = f"{after} ms, loss error {text(error, 2)}, false alarms {result.summary['false_alarms']}"
-        parts.append(f"{result.run.id}: {told}{'' if survived(result) else ', ' + fate(result)}")
+        measured = f"{after} ms, loss error {text(error, 2)}, false alarms {result.summary['false_alarms']}"
+        parts.append(f"{result.run.id}: {measured}{'' if survived(result) else ', ' + fate(result)}")
         holds = holds and right
     return [Reading("", "; ".join(parts), holds)]
 
@@ -132,27 +134,27 @@ def range_of(signal: str) -> Callable[..., list[Reading]]:
     """Claim 7: range of a signal at least 5 % smaller than SMC's; less than that nobody would call reduced."""
 
     def judge(ours: Result, theirs: Result, *matched: Result) -> list[Reading]:
-        found = lower("", ours, theirs, extra(signal, "range"), 0.05)
-        found += lower("without the extreme percents", ours, theirs, extra(signal, "range_98"), 0.05)
-        found += lower("from 5 s on", ours, theirs, extra(signal, "range_steady"), 0.05)
+        readings = lower("", ours, theirs, extra(signal, "range"), 0.05)
+        readings += lower("without the extreme percents", ours, theirs, extra(signal, "range_98"), 0.05)
+        readings += lower("from 5 s on", ours, theirs, extra(signal, "range_steady"), 0.05)
         for other in matched:
-            found += lower(MATCHED, ours, other, extra(signal, "range"), 0.05)
-        return _once(found)
+            readings += lower(MATCHED, ours, other, extra(signal, "range"), 0.05)
+        return _once(readings)
 
     return judge
 
 
 def calmer(ours: Result, theirs: Result, matched: Result) -> list[Reading]:
     """Claim 8: roll and pitch travel less, and the attitude settles earlier."""
-    found = []
+    readings = []
     for name, other in (("", theirs), (MATCHED, matched)):
         way = lower(name, ours, other, lambda r: sum(r.extra["attitude_path"][:2]))
         time = lower(name, ours, other, extra("attitude_settle_time"))
         for a, b in zip(way, time, strict=True):
-            told = a.measured if a == b else f"way of roll and pitch: {a.measured} rad; settling: {b.measured} s"
-            found.append(Reading(a.name, told, a.holds and b.holds))
-    found += lower("position settling time", ours, theirs, lambda r: r.summary["settle_time"]["overall"])
-    return _once(found)
+            measured = a.measured if a == b else f"way of roll and pitch: {a.measured} rad; settling: {b.measured} s"
+            readings.append(Reading(a.name, measured, a.holds and b.holds))
+    readings += lower("position settling time", ours, theirs, lambda r: r.summary["settle_time"]["overall"])
+    return _once(readings)
 
 
 def back(name: str) -> Callable[[Result], list[Reading]]:
@@ -162,27 +164,27 @@ def back(name: str) -> Callable[[Result], list[Reading]]:
         times = (ours.extra["returns"] or {}).get(name) or []
         if not survived(ours) or not times:
             return [Reading("", fate(ours) if not survived(ours) else "no switch was flown", False)]
-        known = [time for time in times if time is not None]
-        longest = max(known) if len(known) == len(times) else None
-        inside = sum(time <= SECONDS for time in known)
-        told = f"longest {text(longest)} s, median {text(float(np.median(known))) if known else 'never'} s; "
-        told += f"{inside} of {len(times)} within {SECONDS:g} s"
+        finite = [time for time in times if time is not None]
+        longest = max(finite) if len(finite) == len(times) else None
+        inside = sum(time <= SECONDS for time in finite)
+        measured = f"longest {text(longest)} s, median {text(float(np.median(finite))) if finite else 'never'} s; "
+        measured += f"{inside} of {len(times)} within {SECONDS:g} s"
         return [
-            Reading("", told, longest is not None and longest <= SECONDS),
-            Reading("nine switches in ten", told, inside >= 0.9 * len(times)),
+            Reading("", measured, longest is not None and longest <= SECONDS),
+            Reading("nine switches in ten", measured, inside >= 0.9 * len(times)),
         ]
 
     return judge
 
 
-def no_reaching(*flown: Result) -> list[Reading]:
+def no_reaching(*results: Result) -> list[Reading]:
     """Claim 11: sigma starts at zero and stays in the layer until the fault."""
-    start = max(r.extra["sigma_start"] for r in flown)
-    layers = [r.extra["outside_layer"] for r in flown]
+    start = max(r.extra["sigma_start"] for r in results)
+    layers = [r.extra["outside_layer"] for r in results]
     before = max(max(layer["position_before_fault"], layer["attitude_before_fault"]) for layer in layers)
     whole = max(max(layer["position"], layer["attitude"]) for layer in layers)
-    told = f"|sigma(0)| = {start:.2g}; outside the layer for {100 * before:.2g} % of the time before the faults, "
-    return [Reading("", f"{told}{100 * whole:.2g} % in all", start == 0.0 and before == 0.0)]
+    measured = f"|sigma(0)| = {start:.2g}; outside the layer for {100 * before:.2g} % of the time before the faults, "
+    return [Reading("", f"{measured}{100 * whole:.2g} % in all", start == 0.0 and before == 0.0)]
 
 
 def reached(constant: Result, moving: Result) -> list[Reading]:
@@ -204,52 +206,52 @@ def _reached(result: Result) -> Reading:
     return Reading("", f"{result.run.id}: {', '.join(parts)} s", holds)
 
 
-def angles_bounded(*flown: Result) -> list[Reading]:
+def angles_bounded(*results: Result) -> list[Reading]:
     """Assumption 1: |roll|, |pitch| below 90 degrees and |yaw| below 180 degrees throughout."""
     limits = np.array([np.pi / 2.0, np.pi / 2.0, np.pi])
-    largest = np.max([r.extra["attitude_max"] for r in flown], axis=0)
-    told = ", ".join(f"{name} {value:.2f}" for name, value in zip(ANGLES, largest, strict=True)) + " rad"
-    gone = lost(flown)
-    return [Reading("", f"{told}{'; ' + gone if gone else ''}", bool((largest < limits).all()) and not gone)]
+    largest = np.max([r.extra["attitude_max"] for r in results], axis=0)
+    measured = ", ".join(f"{name} {value:.2f}" for name, value in zip(ANGLES, largest, strict=True)) + " rad"
+    fates = lost(results)
+    return [Reading("", f"{measured}{'; ' + fates if fates else ''}", bool((largest < limits).all()) and not fates)]
 
 
 def disturbance_bounded(kind: str, group: str, unit: str) -> Callable[..., list[Reading]]:
     """Assumption 2: the largest disturbance stays below the bound that the law was given."""
 
-    def judge(*flown: Result) -> list[Reading]:
-        largest = max(r.extra["disturbance"][kind] for r in flown)
-        bound = min(r.extra["disturbance_bound"][group] for r in flown)
+    def judge(*results: Result) -> list[Reading]:
+        largest = max(r.extra["disturbance"][kind] for r in results)
+        bound = min(r.extra["disturbance_bound"][group] for r in results)
         return [Reading("", f"largest {largest:.3g}, bound {bound:.3g} {unit}", largest <= bound)]
 
     return judge
 
 
-def gusts_seen(windy: Result, calm: Result) -> list[Reading]:
+def gust_effect(windy: Result, calm: Result) -> list[Reading]:
     """Section 5.3: gusts disturb x (travel) and z (elevation): mean square error at least 10 % above still air's."""
-    gone = lost((windy, calm))
-    if gone:
-        return [Reading("", gone, False)]
+    fates = lost((windy, calm))
+    if fates:
+        return [Reading("", fates, False)]
     ratios = [windy.summary["position_mse"][a] / max(calm.summary["position_mse"][a], 1e-300) for a in ("x", "z")]
     late = [windy.extra["late_rms_error"][i] / max(calm.extra["late_rms_error"][i], 1e-300) for i in (0, 2)]
-    told = f"x {ratios[0]:.2f}, z {ratios[1]:.2f} times the mean square error in still air"
-    told_late = f"x {late[0]:.2f}, z {late[1]:.2f} times the late root mean square error"
+    measured = f"x {ratios[0]:.2f}, z {ratios[1]:.2f} times the mean square error in still air"
+    measured_late = f"x {late[0]:.2f}, z {late[1]:.2f} times the late root mean square error"
     return [
-        Reading("", told, min(ratios) >= 1.1),
-        Reading("second half of the flight", told_late, min(late) >= 1.1),
+        Reading("", measured, min(ratios) >= 1.1),
+        Reading("second half of the flight", measured_late, min(late) >= 1.1),
     ]
 
 
-def accurate(*flown: Result) -> list[Reading]:
-    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.results.metrics`."""
-    ends = [f"{r.run.id} {r.summary['outcome']}" for r in flown]
-    return [Reading("", ", ".join(ends), all(r.summary["outcome"] in ("settled", "tracked") for r in flown))]
+def accurate(*results: Result) -> list[Reading]:
+    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.loop.scoring`."""
+    ends = [f"{r.run.id} {r.summary['outcome']}" for r in results]
+    return [Reading("", ", ".join(ends), all(r.summary["outcome"] in ("settled", "tracked") for r in results))]
 
 
 def level(ours: Result) -> list[Reading]:
     """All angles within 0.1 rad of level and of the yaw reference for good within seconds."""
     time = ours.extra["level_time"] if survived(ours) else None
-    told = f"{text(time)} s until within {LEVEL:g} rad for good" if survived(ours) else fate(ours)
-    return [Reading("", told, time is not None and time <= SECONDS)]
+    measured = f"{text(time)} s until within {LEVEL:g} rad for good" if survived(ours) else fate(ours)
+    return [Reading("", measured, time is not None and time <= SECONDS)]
 
 
 def monotone(ours: Result, theirs: Result) -> list[Reading]:
@@ -263,5 +265,5 @@ def monotone(ours: Result, theirs: Result) -> list[Reading]:
 def tracks_again(ours: Result) -> list[Reading]:
     """Section 5.2: position error within 2 % of the reference's span for good within seconds of the faults."""
     time = ours.summary["settle_time"]["overall"]
-    told = f"from {text(time)} s on (faults at 1.8 s)" if survived(ours) else fate(ours)
-    return [Reading("", told, time is not None and time <= 1.8 + SECONDS)]
+    measured = f"from {text(time)} s on (faults at 1.8 s)" if survived(ours) else fate(ours)
+    return [Reading("", measured, time is not None and time <= 1.8 + SECONDS)]

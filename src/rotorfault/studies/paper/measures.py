@@ -106,24 +106,24 @@ def chattering(time: Array, command: Array, band: float) -> dict[str, Any]:
         of the steady commands' variance in the band (Welch, periodogram of 2 s); the band [Hz].
     """
     step = np.abs(np.diff(command, axis=0))
-    flown = max(float(time[-1] - time[0]), 1e-9)
+    duration = max(float(time[-1] - time[0]), 1e-9)
     steady = time >= STEADY
-    found: dict[str, Any] = {
-        "total_variation": _list(step.sum(axis=0) / flown),
+    numbers: dict[str, Any] = {
+        "total_variation": _list(step.sum(axis=0) / duration),
         "steady_total_variation": None,
         "share_above_band": None,
         "band": None,
     }
     if steady.sum() < LEAST_RECORDS:
-        return found
+        return numbers
     rate = 1.0 / float(np.median(np.diff(time)))
     frequency, power = welch(command[steady], rate, nperseg=min(int(2.0 * rate), int(steady.sum())), axis=0)
     total, above = power[1:].sum(), power[frequency > band / (2.0 * np.pi)].sum()
-    found["steady_total_variation"] = float(step[steady[1:]].sum() / 4.0 / (time[-1] - STEADY))
+    numbers["steady_total_variation"] = float(step[steady[1:]].sum() / 4.0 / (time[-1] - STEADY))
     # Commands that do not move at all have no spectrum, and do not chatter.
-    found["share_above_band"] = float(above / total) if total > 1e-18 else 0.0
-    found["band"] = [band / (2.0 * np.pi), rate / 2.0]
-    return found
+    numbers["share_above_band"] = float(above / total) if total > 1e-18 else 0.0
+    numbers["band"] = [band / (2.0 * np.pi), rate / 2.0]
+    return numbers
 
 
 def _law(scenario: Scenario) -> Any:
@@ -133,7 +133,7 @@ def _law(scenario: Scenario) -> Any:
 
 def outside_layer(data: xr.Dataset, scenario: Scenario) -> dict[str, float] | None:
     """Fraction of time in which any axis of a group is outside its boundary layer; None where there is none."""
-    law, found = _law(scenario), {}
+    law, shares = _law(scenario), {}
     if law is None or getattr(law, "switching", None) is None:
         return None
     onset = _onset(data)
@@ -141,9 +141,9 @@ def outside_layer(data: xr.Dataset, scenario: Scenario) -> dict[str, float] | No
         settings = getattr(law, group)
         weight = np.abs(np.array(getattr(settings, "weight", (1.0, 1.0, 1.0))))
         outside = ~(np.abs(data[name].values) <= weight * settings.layer).all(axis=1)
-        found[group] = float(outside.mean())
-        found[f"{group}_before_fault"] = float(outside[: max(onset, 1)].mean())
-    return found
+        shares[group] = float(outside.mean())
+        shares[f"{group}_before_fault"] = float(outside[: max(onset, 1)].mean())
+    return shares
 
 
 def _onset(data: xr.Dataset) -> int:
@@ -157,17 +157,17 @@ def reaching(data: xr.Dataset, scenario: Scenario) -> list[dict[str, float | Non
     if scenario[CONTROLLER].kind != "smc":
         return None
     settings, s, time = _law(scenario).position, data["controller.sigma_position"].values, data["time"].values
-    found = []
+    entries = []
     for i in range(3):
         inside = np.flatnonzero(np.abs(s[:, i]) <= settings.layer)
         K = settings.K[i]
-        found.append(
+        entries.append(
             {
                 "reached": float(time[inside[0]]) if len(inside) else None,
                 "bound": float(abs(s[0, i]) / K) if K > 0.0 else None,
             }
         )
-    return found
+    return entries
 
 
 def returns(data: xr.Dataset, scenario: Scenario) -> dict[str, list[float | None]] | None:
@@ -188,14 +188,14 @@ def returns(data: xr.Dataset, scenario: Scenario) -> dict[str, list[float | None
     }
     end = float(time[-1])
     switches = sorted({k * p / 2.0 for p in (*s.period, s.yaw_period) for k in range(int(2.0 * end / p) + 1)})
-    found: dict[str, list[float | None]] = {name: [] for name in small}
+    times: dict[str, list[float | None]] = {name: [] for name in small}
     for start, stop in zip(switches, [*switches[1:], end], strict=True):
         window = (time >= start - 1e-9) & (time < stop - 1e-9)
         if stop - start >= 5.0 - 1e-9 and window.any():
             for name, inside in small.items():
                 back = _since(time[window], ~inside[window])
-                found[name].append(None if back is None else max(back - start, 0.0))
-    return found
+                times[name].append(None if back is None else max(back - start, 0.0))
+    return times
 
 
 def _since(time: Array, outside: NDArray[np.bool_]) -> float | None:
@@ -252,12 +252,12 @@ def _bounds(scenario: Scenario) -> dict[str, float | None] | None:
     law = _law(scenario)
     if law is None or getattr(law, "switching", None) is None:
         return None
-    found: dict[str, float | None] = {}
+    bounds: dict[str, float | None] = {}
     for group in _GROUPS:
         settings = getattr(law, group)
         K = getattr(settings, "K", None)
-        found[group] = float(settings.gamma_0) if K is None else float(min(K if group == "position" else K[:2]))
-    return found
+        bounds[group] = float(settings.gamma_0) if K is None else float(min(K if group == "position" else K[:2]))
+    return bounds
 
 
 def _spread(values: Array, time: Array) -> dict[str, Any]:

@@ -69,14 +69,14 @@ def _counts(claims: list[Claim]) -> dict[str, int]:
 
 
 def _figures(page: Page, captions: Mapping[str, str]) -> list[dict[str, str]]:
-    found = []
+    blocks = []
     for name, caption in captions.items():
         path = page.folder / "figures" / f"{name}.png"
         if path.is_file():
             data = base64.b64encode(path.read_bytes()).decode("ascii")
             title = f"Fig. {int(name[3:])}" if name.startswith("fig") else ""
-            found.append({"name": name, "title": title, "caption": caption, "data": data})
-    return found
+            blocks.append({"name": name, "title": title, "caption": caption, "data": data})
+    return blocks
 
 
 def _flights(results: Mapping[str, Result]) -> list[dict[str, Any]]:
@@ -97,12 +97,12 @@ def _rows(path: Path) -> list[list[str]]:
 
 def _records() -> list[dict[str, Any]]:
     """How the presets that were flown were found."""
-    found = []
+    records = []
     for controller in ("smc", "roismc"):
         record = record_of(controller, "tuned")
         if record:
-            found.append({"controller": controller, **record})
-    return found
+            records.append({"controller": controller, **record})
+    return records
 
 
 def _number(value: float | None, digits: int = 4) -> str:

@@ -55,32 +55,32 @@ def runs() -> list[Run]:
 def rows(results: Mapping[str, Result]) -> list[Row]:
     """All variations whose flights are there, with what moved against their baseline."""
     judged: dict[tuple[str, str], dict[str, bool | None]] = {}
-    found = []
+    entries = []
     for variation in variations():
         for case in variation.cases:
-            flown = variation.runs(case)
-            if not all(run.id in results for run in flown):
+            pair = variation.runs(case)
+            if not all(run.id in results for run in pair):
                 continue
-            ours, theirs = (results[run.id] for run in flown)
+            ours, theirs = (results[run.id] for run in pair)
             holds = conclusions(ours, theirs, variation.cost)
             judged[variation.id, case] = holds
             base = judged.get((variation.baseline, case), holds)
             moved = [name for name in CONCLUSIONS if {holds[name], base[name]} == {True, False}]
-            found.append(Row(variation, case, ours, theirs, holds, moved))
-    return found
+            entries.append(Row(variation, case, ours, theirs, holds, moved))
+    return entries
 
 
 def conclusions(ours: Result, theirs: Result, cost: str = "") -> dict[str, bool | None]:
     """The five conclusions from a pair of flights; `cost` names another reading of the cost."""
     both = stays(ours) and stays(theirs)
-    found: dict[str, bool | None] = dict.fromkeys(CONCLUSIONS)
-    found["survive"] = both
-    found["detected"] = all(detected(result)[0].holds for result in (ours, theirs))
+    answers: dict[str, bool | None] = dict.fromkeys(CONCLUSIONS)
+    answers["survive"] = both
+    answers["detected"] = all(detected(result)[0].holds for result in (ours, theirs))
     if both:
-        found["earlier"] = _less(settling(ours), settling(theirs))
-        found["cost"] = _less(cost_of(ours, cost), cost_of(theirs, cost))
-        found["error"] = _less(error_of(ours), error_of(theirs))
-    return found
+        answers["earlier"] = _less(settling(ours), settling(theirs))
+        answers["cost"] = _less(cost_of(ours, cost), cost_of(theirs, cost))
+        answers["error"] = _less(error_of(ours), error_of(theirs))
+    return answers
 
 
 def _less(a: float, b: float) -> bool | None:
@@ -93,14 +93,14 @@ def settling(result: Result) -> float:
     returns = result.extra["returns"]
     if returns and returns["position"]:
         return float(np.median([math.inf if time is None else time for time in returns["position"]]))
-    found = result.summary["settle_time"]["overall"]
-    return math.inf if found is None else float(found)
+    overall = result.summary["settle_time"]["overall"]
+    return math.inf if overall is None else float(overall)
 
 
 def cost_of(result: Result, reading: str = "") -> float:
     """Cost J; infinite where it is no number."""
-    found = result.extra["cost_readings"][reading] if reading else result.summary["cost"]
-    return math.inf if found is None else float(found)
+    value = result.extra["cost_readings"][reading] if reading else result.summary["cost"]
+    return math.inf if value is None else float(value)
 
 
 def error_of(result: Result) -> float:
@@ -153,26 +153,26 @@ def _word(holds: bool | None) -> str:
 
 def findings(results: Mapping[str, Result]) -> list[str]:
     """A line per conclusion: how often it holds, and under which variations it moves."""
-    found = rows(results)
+    entries = rows(results)
     lines = []
     for name, title in CONCLUSIONS.items():
-        decided = [row for row in found if row.holds[name] is not None]
+        decided = [row for row in entries if row.holds[name] is not None]
         count = sum(bool(row.holds[name]) for row in decided)
         moved: dict[str, list[str]] = {}
         for row in decided:
             if name in row.moved:
                 moved.setdefault(row.variation.label, []).append(str(CASES[row.case].number))
-        told = "; ".join(f"{label} (case {', '.join(cases)})" for label, cases in moved.items())
+        moves = "; ".join(f"{label} (case {', '.join(cases)})" for label, cases in moved.items())
         line = f"{title[0].upper()}{title[1:]}: in {count} of {len(decided)} variations and cases"
-        lines.append(f"{line}. Moves with: {told}." if told else f"{line}; nothing moves it.")
+        lines.append(f"{line}. Moves with: {moves}." if moves else f"{line}; nothing moves it.")
     return lines
 
 
 def figure(results: Mapping[str, Result]) -> Figure:
     """Conclusions by variation and case: which hold, which do not, which moved."""
-    found = rows(results)
-    table = {(row.variation.label, row.case): row for row in found}
-    labels = list(dict.fromkeys((row.variation.group, row.variation.label) for row in found))
+    entries = rows(results)
+    table = {(row.variation.label, row.case): row for row in entries}
+    labels = list(dict.fromkeys((row.variation.group, row.variation.label) for row in entries))
     cells: list[list[tuple[bool | None, bool] | None]] = []
     for _, label in labels:
         line: list[tuple[bool | None, bool] | None] = []

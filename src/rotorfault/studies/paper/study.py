@@ -92,8 +92,8 @@ def reproduce(folder: Path, quick: bool = False, workers: int | None = None) -> 
     results = {run.id: store.get(run) for run in wanted}
     clock = timed("flights", clock)
 
-    found = claims.claims(results)
-    claims_json(found, folder / "claims.json")
+    verdicts = claims.claims(results)
+    claims_json(verdicts, folder / "claims.json")
     table1.write_csv(results, folder / "table1.csv")
     extras: dict[str, Figure] = {"wind": claims.fig_wind(results)}
     if not quick:
@@ -106,11 +106,11 @@ def reproduce(folder: Path, quick: bool = False, workers: int | None = None) -> 
     drawing.save(drawn, folder / "figures", ("png", "svg"))
     clock = timed("figures", clock)
 
-    page = Page(folder, results, found, quick, seconds)
+    page = Page(folder, results, verdicts, quick, seconds)
     text = render(page)
     write_atomically(folder / "report.html", lambda temporary: temporary.write_text(text, encoding="utf-8"))
     timed("report", clock)
-    return Reproduced(folder, flown, results, found, seconds)
+    return Reproduced(folder, flown, results, verdicts, seconds)
 
 
 def line(result: Result) -> str:

@@ -58,7 +58,7 @@ def runs() -> list[Run]:
 
 def rows(results: Mapping[str, Result]) -> list[Row]:
     """The table, one row per case whose flights are all there."""
-    found = []
+    entries = []
     for case in CASES.values():
         ids = (
             run_of(case.id, "smc", preset="matched").id,
@@ -68,8 +68,8 @@ def rows(results: Mapping[str, Result]) -> list[Row]:
         if all(name in results for name in ids):
             matched, smc, roismc = (results[name] for name in ids)
             paper = Costs(case.paper_cost["smc"], case.paper_cost["roismc"], "", "")
-            found.append(Row(case.id, case.title, paper, _costs(matched, roismc), _costs(smc, roismc)))
-    return found
+            entries.append(Row(case.id, case.title, paper, _costs(matched, roismc), _costs(smc, roismc)))
+    return entries
 
 
 def _costs(smc: Result, roismc: Result) -> Costs:

@@ -58,7 +58,7 @@ def _floor(factor: float) -> dict[str, Any]:
     return {"controller.law.weights.error_floor": floors}
 
 
-def _known(w: float) -> dict[str, Any]:
+def _bandwidth(w: float) -> dict[str, Any]:
     return {"vehicle.rotor_bandwidth.value": w}
 
 
@@ -71,33 +71,33 @@ def _wind(degrees: float) -> list[float]:
 def variations() -> tuple[Variation, ...]:
     """All variations; a baseline stands before those that are compared with it."""
     V, calm = Variation, ("set-point",)
-    found = [V(BASE, BASE, "baseline")]
+    entries = [V(BASE, BASE, "baseline")]
     rotors = "rotor bandwidth"
-    found += [V(f"rotor-{w:g}", rotors, f"{w:g} rad/s, known", _known(w)) for w in (15.0, 25.0, 75.0, 100.0)]
-    found += [
-        V(f"rotor-{w:g}-gentle", rotors, f"{w:g} rad/s, known, 'gentle' gains", _known(w), preset="gentle")
+    entries += [V(f"rotor-{w:g}", rotors, f"{w:g} rad/s, known", _bandwidth(w)) for w in (15.0, 25.0, 75.0, 100.0)]
+    entries += [
+        V(f"rotor-{w:g}-gentle", rotors, f"{w:g} rad/s, known, 'gentle' gains", _bandwidth(w), preset="gentle")
         for w in (15.0, 25.0)
     ]
-    found += [
+    entries += [
         V(f"rotor-{w:g}-unknown", rotors, f"{w:g} rad/s, believed 50", {"mismatch.rotor_bandwidth": w / BANDWIDTH})
         for w in (15.0, 25.0, 35.0, 75.0, 100.0)
     ]
-    found += [
+    entries += [
         V("arm", "vehicle", "arm 0.225 m", {"vehicle": "paper-arm-0225"}),
         V("iz", "vehicle", "I_z 3.3e-3 kg m²", {"vehicle": "paper-iz-33e-4"}),
     ]
-    found += [
+    entries += [
         V(f"thrust-{ratio:g}", "vehicle", f"thrust-to-weight {ratio:g}",
           {"vehicle.thrust_max.value": round(ratio * WEIGHT / 4.0, 6)})
         for ratio in (1.5, 1.75, 2.5, 3.0)
     ]  # fmt: skip
-    found += [
+    entries += [
         V(f"wind-{angle:g}", "wind", f"towards {angle:g}°, 3.6 m/s", {"wind.velocity_W": _wind(angle)}, cases=calm)
         for angle in (0.0, 90.0, 180.0, 270.0)
     ]
     drag = {"wind.velocity_W": [3.6, 0.0, 0.0], "vehicle.linear_drag.value": 0.3}
-    found.append(V("drag", "wind", "k_d 0.3 N s/m, along +x", drag, cases=calm))
-    found += [
+    entries.append(V("drag", "wind", "k_d 0.3 N s/m, along +x", drag, cases=calm))
+    entries += [
         V(f"floor-{factor:g}", "weights", f"floor of |e| times {factor:g}", own=_floor(factor))
         for factor in (0.5, 2.0)
     ]
@@ -107,20 +107,20 @@ def variations() -> tuple[Variation, ...]:
         "attitude.weight": [-0.614, -0.232, 0.765], "position.weight": [-0.751, 0.121, 0.876],
         "attitude.k": [0.0112, 0.876, 0.665], "position.k": [0.0156, 0.164, 0.0212],
     }  # fmt: skip
-    found += [
+    entries += [
         V("n-order", "weights", "n in the order of R", own={f"controller.law.{key}": v for key, v in n.items()}),
         V("ismc", "weights", "ISMC for ROISMC", law="ismc"),
         V("t-order", "weights", "ISMC, T and Λ in R's order", law="ismc", baseline="ismc",
           own={f"controller.law.{key}": value for key, value in T.items()}),
     ]  # fmt: skip
-    found += [V(f"cost-{k}", "cost", name, cost=name) for k, name in enumerate(COST_READINGS, start=1)]
-    found += [
+    entries += [V(f"cost-{k}", "cost", name, cost=name) for k, name in enumerate(COST_READINGS, start=1)]
+    entries += [
         V("feed-forward", "model", "acceleration fed forward", {"reference.feed_forward": True}, cases=("square",)),
         V("six-inputs", "model", "six inputs, no cascade", {"controller.cascade.six_inputs": True}),
         V("rigid", "model", "rigid-body plant", plant="rigid_body"),
     ]
-    found += [
+    entries += [
         V(f"poles-{p:g}", "observer", f"poles {p:g}, {1.5 * p:g} rad/s", {"diagnosis.poles": [p, 1.5 * p]})
         for p in (60.0, 90.0, 180.0, 240.0)
     ]
-    return tuple(found)
+    return tuple(entries)

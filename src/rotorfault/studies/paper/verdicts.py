@@ -127,8 +127,8 @@ def lower(
         return [Reading(name, f"ROISMC {fate(ours)}", False)]
     if not survived(theirs):
         label = f"{name}, {LOST_IS_WORSE}" if name else LOST_IS_WORSE
-        told = f"SMC {fate(theirs)}, ROISMC flies on"
-        return [Reading(name, told, False), Reading(label, "ROISMC flies on, SMC does not", True)]
+        measured = f"SMC {fate(theirs)}, ROISMC flies on"
+        return [Reading(name, measured, False), Reading(label, "ROISMC flies on, SMC does not", True)]
     a, b = value(ours), value(theirs)
     if a is None or b is None:
         return [Reading(name, f"ROISMC {text(a)}, SMC {text(b)}", a is not None)]
@@ -139,10 +139,10 @@ def lower(
 def extra(*keys: str) -> Callable[[Result], Any]:
     """A number of `Result.extra` by its keys; None where there is none."""
 
-    def read(result: Result) -> Any:
-        found: Any = result.extra
+    def number(result: Result) -> Any:
+        value: Any = result.extra
         for key in keys:
-            found = None if found is None else found[key]
-        return found
+            value = None if value is None else value[key]
+        return value
 
-    return read
+    return number

@@ -55,8 +55,8 @@ def oscillation(result: Result) -> float:
 
 def settling(result: Result) -> float:
     """Time to settle within 2 % on all axes in s; infinite if it never does."""
-    found = result.summary["settle_time"]["overall"]
-    return math.inf if found is None else float(found)
+    overall = result.summary["settle_time"]["overall"]
+    return math.inf if overall is None else float(overall)
 
 
 def offset(result: Result) -> float:
@@ -66,8 +66,8 @@ def offset(result: Result) -> float:
 
 def rank_correlation(values: Sequence[float]) -> float:
     """Spearman's correlation of values with their order; 0 where all are equal. Ties share their mean rank."""
-    given = np.asarray(values)
-    ranks = np.array([(given < value).sum() + 0.5 * ((given == value).sum() - 1) for value in given])
+    numbers = np.asarray(values)
+    ranks = np.array([(numbers < value).sum() + 0.5 * ((numbers == value).sum() - 1) for value in numbers])
     spread = ranks.std()
     if not spread > 0.0:
         return 0.0
@@ -80,7 +80,7 @@ def grows(values: Sequence[float]) -> bool:
     return values[-1] > values[0] and rank_correlation(values) >= RANK
 
 
-def _told(values: Sequence[float], unit: str) -> str:
+def _ends(values: Sequence[float], unit: str) -> str:
     first, last = (text(None if math.isinf(v) else v) for v in (values[0], values[-1]))
     ends = f"{first} to {last} {unit} from {SPEEDS[0]:g} to {SPEEDS[-1]:g} m/s"
     return f"{ends} (rank correlation {rank_correlation(values):+.2f})"
@@ -88,40 +88,40 @@ def _told(values: Sequence[float], unit: str) -> str:
 
 def growth(*results: Result) -> list[Reading]:
     """Judge of claim 5: both oscillation and settling time grow."""
-    found = []
+    readings = []
     n = len(SPEEDS)
     for name, part in (("", results[:n]), (OTHER, results[n : 2 * n]), ("SMC", results[2 * n :])):
-        told = lost(part)
-        if told:
-            found.append(Reading(name, told, False))
+        fates = lost(part)
+        if fates:
+            readings.append(Reading(name, fates, False))
             continue
         ways, times = [oscillation(r) for r in part], [settling(r) for r in part]
         holds = grows(ways) and grows(times)
-        found.append(Reading(name, f"oscillation {_told(ways, 'rad')}, settling {_told(times, 's')}", holds))
-    return found
+        readings.append(Reading(name, f"oscillation {_ends(ways, 'rad')}, settling {_ends(times, 's')}", holds))
+    return readings
 
 
 def offsets(*results: Result) -> list[Reading]:
     """Judge of claim 9: the offset grows with the wind's speed, lies down-wind, and is small."""
-    found = []
+    readings = []
     n = len(SPEEDS)
     for name, part, direction in (
         ("", results[:n], DIRECTION),
         (OTHER, results[n : 2 * n], (1.0, 0.0, 0.0)),
         ("SMC", results[2 * n :], DIRECTION),
     ):
-        told = lost(part)
-        if told:
-            found.append(Reading(name, told, False))
+        fates = lost(part)
+        if fates:
+            readings.append(Reading(name, fates, False))
             continue
         values = [offset(r) for r in part]
         last = np.asarray(part[-1].extra["position_offset_end"])
         along = float(last @ np.asarray(direction) / max(float(np.linalg.norm(last)), 1e-300))
         # Below a tenth of a millimetre there is nothing that a reader could call an offset.
         holds = grows(values) and values[-1] >= 1e-4 and values[-1] <= 0.04 and along >= 0.9
-        told = f"offset {1e3 * values[0]:.3g} to {1e3 * values[-1]:.3g} mm, cosine with the wind {along:+.2f}"
-        found.append(Reading(name, told, holds))
-    return found
+        measured = f"offset {1e3 * values[0]:.3g} to {1e3 * values[-1]:.3g} mm, cosine with the wind {along:+.2f}"
+        readings.append(Reading(name, measured, holds))
+    return readings
 
 
 def rules() -> list[Rule]:
