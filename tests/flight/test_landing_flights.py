@@ -116,5 +116,5 @@ def test_the_choice_is_one_of_structure() -> None:
 def test_landing_needs_ground_and_a_fine_step() -> None:
     with pytest.raises(rf.InputError, match=r"on_fault: got 'land' without ground; give its height"):
         rf.load_scenario("paper-set-point", {"on_fault": "land"})
-    with pytest.raises(rf.InputError, match=r"step: got 0.01 s; allowed with ground: up to 0.005 s"):
+    with pytest.raises(rf.InputError, match=r"step: got 0.01 s; allowed with this ground: up to 0.005 s"):
         rf.load_scenario("land-after-fault", {"period": 0.01, "step": 0.01})

@@ -134,10 +134,11 @@ class Layout:
             return list(range(place.start, place.stop))
         if name in self.rows:
             return [self.rows.index(name)]
-        ends = [row for row, full in enumerate(self.rows) if full.partition(".")[2] == name]
-        return ends or [
-            row
-            for signal in self.signals
-            if signal.name.partition(".")[2] == name
-            for row in range(self._starts[signal.name].start, self._starts[signal.name].stop)
-        ]
+        rows = []
+        for signal in self.signals:
+            slot, _, short = signal.name.rpartition(".")
+            place = self._starts[signal.name]
+            for row in range(place.start, place.stop) if slot else ():
+                if name == short or self.rows[row] == f"{slot}.{name}":
+                    rows.append(row)
+        return rows

@@ -75,10 +75,12 @@ class Part(Generic[B]):
 
     @property
     def source(self) -> str:
-        """Digest of the source, for a part from outside the package; empty for one of the package's own."""
+        """Digest of the source, for a part from outside the package or one that runs code from there; else empty."""
         factory = self.factory
         home = getattr(factory, "__module__", type(factory).__module__)
-        return "" if foreign.is_own(home) else foreign.source_digest(getattr(factory, "kind", factory))
+        own = [] if foreign.is_own(home) else [getattr(factory, "kind", factory)]
+        own += [foreign.load(place, self.slot.registry.sort) for place in self.settings.code()]
+        return "".join(foreign.source_digest(thing) for thing in own)
 
 
 def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
