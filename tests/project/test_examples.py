@@ -51,7 +51,9 @@ def settings(name: str, **own: Any) -> dict[str, Any]:
     """Of a short flight with this example in its slot."""
     slot, table = SLOT.get(name, name), {"kind": place(name), **own}
     changed = {key: value for key, value in SHORT.items() if key.partition(".")[0] != slot}
-    return changed | {slot: [{"rotor": 1, "start": 0.1, **table}] if name == "fault" else table}
+    table |= {"rotor": 1} if name == "fault" else {}
+    table |= {"start": 0.1} if name in ("fault", "wind") else {}
+    return changed | {slot: [table] if name == "fault" else table}
 
 
 @every_part
@@ -118,7 +120,7 @@ def test_the_example_study_flies_and_its_rows_replay(tmp_path: Path) -> None:
     tables["refine"] = {"initial": 2, "block": 2, "most": 2}
     tables["variant"][1]["settings"]["controller.kind"] = place("controller")
     done = rf.campaign(study_from(tables, "short", allow_code=True), tmp_path / "study", allow_code=True)
-    assert set(done.table["variant"]) == {"roismc", "pd"}
+    assert set(done.table().column("variant").to_pylist()) == {"roismc", "pd"}
     run = CliRunner().invoke(
         app, ["replay", str(tmp_path / "study"), "--cell", "1", "--variant", "pd", "--allow-code", "--no-figures"]
     )

@@ -106,7 +106,8 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
     lasted = (scores.over == 0.0) & (flown.steps >= batch.steps)
     outcome = np.where((scores.over > 0.0) | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
     survived = np.isin(outcome, SURVIVED)
-    end_time = np.where(scores.over > 0.0, scores.end, flown.steps) * dt
+    end: Array = np.asarray(scores.end, dtype=float)
+    end_time: Array = np.where(scores.over > 0.0, end, flown.steps) * dt
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 / np.where(scores.seen > 0.0, scores.seen, np.nan)
         table: Columns = {"outcome": outcome, "survived": survived, "end_time": end_time}
