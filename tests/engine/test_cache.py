@@ -172,7 +172,8 @@ def test_structure_is_one_word_per_part() -> None:
     *parts, _, substeps = structure(assemble(short(fault=faults)).loop)
     slots = [word.partition(":")[0] for word in parts]
     assert slots == [
-        "wind", "fault", "fault", "plant", "sensors", "estimator", "diagnosis", "on_fault", "controller", "allocation",
+        "wind", "fault", "fault", "plant", "sensors", "estimator", "diagnosis", "on_fault", "controller",
+        "allocation",
     ]  # fmt: skip
     assert "RigidBody" in parts[slots.index("plant")]
     assert substeps == "1"

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import rotorfault as rf
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.study import study_from
-from rotorfault.cli.app import app
+from rotorfault.cli.main import app
 from rotorfault.engine import have_simd
 from rotorfault.flight.sweep import checked_columns, groups_of
 
@@ -72,8 +72,8 @@ def test_an_example_records_its_own_signal_and_obeys_its_setting(name: str) -> N
     assert not np.array_equal(flights[0].data["position"].values, flights[1].data["position"].values) or (
         not np.array_equal(here.values, there.values)
     )
-    assert not [other for other in flights[0].data if "." in other and other.startswith(f"{signal.split('.')[0]}.")
-                and other not in {f"{signal.split('.')[0]}.{field}" for field in (signal.split(".")[1],)}]  # fmt: skip
+    slot = signal.partition(".")[0]
+    assert [other for other in flights[0].data if other.startswith(f"{slot}.")] == [signal]
 
 
 @pytest.mark.parametrize("name", [name for name in PARTS if name != "reference"])
@@ -193,7 +193,7 @@ def test_an_update_that_returns_nonsense_is_told() -> None:
         rf.fly("paper-set-point", Wrong(), settings={"duration": 0.1})
 
 
-# ------------------------------------------------------------------------------------------------------------ the page
+# ----------------------------------------------------------------------------------------------------- the page
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.iterdir()), ids=lambda path: path.name)

@@ -265,7 +265,10 @@ class Scoring:
                 for detection, rotor in zip(scores.detections, self.rotors, strict=True)
             ),
             signals=self._counts(
-                *(self._signal(signal, old, signals, first) for signal, old in zip(self.counted, scores.signals, strict=True))
+                *(
+                    self._signal(signal, old, signals, first)
+                    for signal, old in zip(self.counted, scores.signals, strict=True)
+                )
             ),
         )  # fmt: skip
 

@@ -56,7 +56,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
         raise InputError(
-            f"{path}: was written by version {data.attrs.get('version', '0.1')} and holds other signals than this one "
+            f"{path}: was written by version {data.attrs.get('version', '0.1')} and holds other signals than this version "
             "reads; 'rotorfault fly --repeat' flies it again"
         )
     if form != FORMAT:

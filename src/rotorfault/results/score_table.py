@@ -5,8 +5,10 @@ flight, detections of rotors that no fault hits, landings that were not begun. C
 angle or rotor:
 
 - ``outcome``, ``survived``, ``end_time`` [s];
-- ``settle_time`` and ``recovery_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m], ``velocity_end`` [m/s], by axis;
-- ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``, ``tilt_end``
+- ``settle_time`` and ``recovery_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m],
+  ``velocity_end`` [m/s], by axis;
+- ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``,
+  ``tilt_end``
   [rad];
 - ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
   flights that lasted); ``cost``;
