@@ -13,7 +13,7 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.cli import catalogue
-from rotorfault.report import comparison
+from rotorfault.flight import comparison
 from rotorfault.results.dataset import OLD_FORMAT
 
 SHORT = {"duration": 0.5}

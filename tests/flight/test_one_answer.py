@@ -12,7 +12,7 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.engine import have_simd
-from rotorfault.report import comparison
+from rotorfault.flight import comparison
 from rotorfault.results.outcome import finite_or_none
 from rotorfault.results.score_table import nested
 from rotorfault.results.text import UNTIL_LOST, rows
