@@ -128,7 +128,8 @@ def test_the_key_tells_structures_apart() -> None:
         digest(controller={"kind": "smc", "preset": "none", "law": {"switching": "discontinuous"}}),
         digest(controller={"kind": "smc", "preset": "none", "cascade": {"six_inputs": True}}),
         digest(diagnosis={"kind": "delayed", "delay": 0.1}),
-        digest(diagnosis={"kind": "delayed", "delay": 0.2}),
+        digest(diagnosis="oracle"),
+        digest(reference={"kind": "set_point", "position": [0.2, -0.1, 0.3]}, ground=-1.0),
         digest(plant="paper_model"),
         digest(step=0.001),
         digest(sensors="ideal"),
@@ -138,23 +139,18 @@ def test_the_key_tells_structures_apart() -> None:
     assert len({base, *others}) == 1 + len(others)
 
 
-class ArrayGains:
+class ArrayGains(rotorfault.Controller):
     """A block from outside the package whose numbers lie in an array that it keeps to itself."""
 
     def __init__(self, gains: Any) -> None:
+        super().__init__()
         self.gains = np.asarray(gains)
 
-    def parameters(self, vehicle: Any, period: float) -> tuple[()]:
-        return ()
-
-    def initial(self, measurement: Any, reference: Any, parameters: Any) -> tuple[()]:
-        return ()
-
     def step(self, memory: Any, inputs: Any, parameters: Any, dt: Any) -> Any:
-        climb = (inputs.reference.p_W.z - inputs.measurement.p_W.z) * self.gains[0].item()
+        climb = (inputs.reference.p_W.z - inputs.estimate.p_W.z) * self.gains[0].item()
         nothing = rotorfault.Vec3(0.0, 0.0, 0.0)
         wrench = rotorfault.Wrench(inputs.vehicle.mass * (inputs.vehicle.gravity + climb), nothing)
-        return memory, rotorfault.ControlOutput(wrench, nothing, rotorfault.no_telemetry())
+        return memory, rotorfault.ControlOutput(wrench), rotorfault.Nothing()
 
 
 def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,6 +167,13 @@ def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monk
 
 
 def test_structure_is_one_word_per_part() -> None:
-    words = structure(assemble(short()).loop)
-    assert all(isinstance(word, str) for word in words)
-    assert "RigidBody" in words[0]
+    """In the order of the slots; of several in one slot each, and besides them the reference and the steps."""
+    faults = [{"kind": "total", "rotor": rotor, "time": 0.1} for rotor in (2, 4)]
+    *parts, _, substeps = structure(assemble(short(fault=faults)).loop)
+    slots = [word.partition(":")[0] for word in parts]
+    assert slots == [
+        "wind", "fault", "fault", "plant", "sensors", "estimator", "diagnosis", "on_fault", "controller",
+        "allocation",
+    ]  # fmt: skip
+    assert "RigidBody" in parts[slots.index("plant")]
+    assert substeps == "1"

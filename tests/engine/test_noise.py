@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rotorfault.engine.noise import FIRST_GUST, GUSTS, SENSOR_NOISE, Noise, counter_word, normals, threefry
+from rotorfault.engine.noise import Noise, Stream, counter_word, normals, threefry
+from rotorfault.plant import SENSORS, WIND, Dryden
+from rotorfault.plant.sensors import Noisy
+
+SENSOR_NOISE = Stream(Noisy.normals, SENSORS.streams[0])
+GUSTS = Stream(Dryden.normals, WIND.streams[0])
+FIRST_GUST = Stream(Dryden.first_normals, WIND.streams[1])
 
 
 @pytest.mark.parametrize(

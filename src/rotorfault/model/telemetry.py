@@ -80,8 +80,8 @@ def signals_of(telemetry: type[tuple[Any, ...]], prefix: str = "") -> tuple[Sign
         if quantity is None or kind not in KINDS:
             allowed = ", ".join(getattr(one, "__name__", "Scalar") for one in KINDS if one is not Scalar)
             raise InputError(
-                f"telemetry {telemetry.__name__}.{name}: allowed: Annotated[KIND, Quantity(unit, frame, meaning)] with "
-                f"KIND one of Scalar, {allowed}"
+                f"telemetry {telemetry.__name__}.{name}: allowed: Annotated[KIND, Quantity(unit, frame, meaning)] "
+                f"with KIND one of Scalar, {allowed}"
             )
         signals.append(Signal(f"{prefix}.{name}" if prefix else name, kind, quantity))
     return tuple(signals)
