@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from own_parts import write_parts
+from foreign_parts import write_parts
 
 import rotorfault as rf
 from rotorfault.autopilot.control import CONTROLLER

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from own_parts import BASE, write_parts
+from foreign_parts import BASE, write_parts
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.python_controller import PythonController

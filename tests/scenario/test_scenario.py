@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import pytest
-from own_parts import BASE
+from foreign_parts import BASE
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.response import ON_FAULT
