@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, cast, final
 
 from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
-from rotorfault.autopilot.response.land import Land
+from rotorfault.autopilot.response.protocol import ON_FAULT
 from rotorfault.loop.recorded import Recorder
 from rotorfault.loop.scores import Scores, ScoringParameters, unjudged
 from rotorfault.loop.scoring import Scoring
@@ -117,7 +117,8 @@ class ClosedLoop:
                 telemetry |= {f"{slot.name}_{number}": one.Telemetry for number, one in enumerate(part)}
             else:
                 telemetry[slot.name] = part.Telemetry
-        lands = any(isinstance(part, Land) for part in self.parts.values())
+        response = self.maybe(ON_FAULT)
+        lands = response is not None and response.lands
         self.recorder = Recorder(self.plant.ground is not None, lands, telemetry)
         self.layout = self.recorder.layout
         self.scoring = Scoring(

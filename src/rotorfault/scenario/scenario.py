@@ -133,7 +133,7 @@ class Scenario(Strict):
             raise refusal(
                 "record_period", f"got {self.record_period:g} s; allowed: a multiple of the period {self.period:g} s"
             )
-        if self.maybe(GROUND) is None and self[ON_FAULT].kind == "land":
+        if self.maybe(GROUND) is None and getattr(self[ON_FAULT].factory, "lands", False):
             raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
         if (ground := self.maybe(GROUND)) is not None:
             step, longest = self.period / self.substeps, ground.make().longest_step()
