@@ -121,6 +121,7 @@ def test_the_key_tells_structures_apart() -> None:
 
     base = digest()
     assert digest() == base
+    assert digest(diagnosis={"kind": "delayed", "delay": 0.1}) == digest(diagnosis={"kind": "delayed", "delay": 0.2})
     assert digest(seed=9, fault=[{"kind": "step", "rotor": 2, "time": 0.2, "loss": 0.3}]) == base
     others = [
         digest(fault=[{"kind": "step", "rotor": 3, "time": 0.1, "loss": 0.2}]),
@@ -169,10 +170,9 @@ def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monk
 def test_structure_is_one_word_per_part() -> None:
     """In the order of the slots; of several in one slot each, and besides them the reference and the steps."""
     faults = [{"kind": "total", "rotor": rotor, "time": 0.1} for rotor in (2, 4)]
-    *parts, _, substeps = structure(assemble(short(fault=faults)).loop)
+    *parts, _, substeps, floats = structure(assemble(short(fault=faults)).loop)
     slots = [word.partition(":")[0] for word in parts]
-    assert slots == [
-        "wind", "fault", "fault", "plant", "sensors", "estimator", "diagnosis", "on_fault", "controller", "allocation",
-    ]  # fmt: skip
+    truth, belief = ["wind", "fault", "fault", "plant", "sensors"], ["estimator", "diagnosis", "on_fault"]
+    assert slots == [*truth, *belief, "controller", "allocation"]
     assert "RigidBody" in parts[slots.index("plant")]
-    assert substeps == "1"
+    assert (substeps, floats) == ("1", "()"), "all parts are the package's own, whose floats are numbers"
