@@ -114,8 +114,9 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
         raise InputError("no scenarios were given; a batch needs at least one")
     batches = [assemble(scenario) for scenario in scenarios]
     first = batches[0]
+    alike = same_code(*batches)
     for batch, scenario in zip(batches[1:], scenarios[1:], strict=True):
-        same = same_code(first, batch) and batch.every == first.every
+        same = (alike or same_code(first, batch)) and batch.every == first.every
         if not same or not np.array_equal(batch.reference, first.reference):
             raise InputError(
                 f"scenario '{scenario.name}' differs from the first in more than numbers (parts, options, length or "
