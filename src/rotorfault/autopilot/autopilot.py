@@ -50,8 +50,8 @@ class Autopilot:
     Parameters
     ----------
     parts : mapping of Slot to Block
-        In the order in which they act: estimator, diagnosis, response, controller, allocation, and whatever else has a
-        slot.
+        In the order in which they act: estimator, diagnosis, response, controller, allocation, and whatever else has
+        a slot.
     """
 
     def __init__(self, parts: Mapping[Slot[Any], AnyBlock]) -> None:

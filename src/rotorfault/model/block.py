@@ -24,7 +24,7 @@ MemoryT = TypeVar("MemoryT")
 ParametersT = TypeVar("ParametersT")
 
 Record: TypeAlias = tuple[Any, ...]
-"""A NamedTuple of scalars, value types and records; its leaves are of whatever number type an engine computes with."""
+"""A NamedTuple of scalars, value types and records; its leaves are of the number type of an engine."""
 
 
 class Context(NamedTuple):

@@ -1,7 +1,7 @@
 """What flows between the parts of the closed loop: records with named fields, SI units and radians.
 
-Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Attitude flows as a unit quaternion ``q_WB``
-(body to world); angles are for people. Thrusts are in newton per rotor.
+Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Attitude flows as a unit quaternion
+``q_WB`` (body to world); angles are for people. Thrusts are in newton per rotor.
 """
 
 from __future__ import annotations

@@ -130,11 +130,13 @@ class Slot(Generic[B]):
         """
         if self.adapt is not None and (adapted := self.adapt(part)) is not None:
             return adapted
-        home = slot_of(part)
+        try:
+            home = slot_of(part)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
         if home is not self or not callable(part):
-            raise InputError(
-                f"{where} is a {home.registry.sort}; allowed: a class that derives from rotorfault.{self.base.__name__}"
-            )
+            allowed = f"a class that derives from rotorfault.{self.base.__name__}"
+            raise InputError(f"{where} is a {home.registry.sort}; allowed: {allowed}")
         return cast("Kind[B]", part)
 
     def __repr__(self) -> str:
@@ -177,7 +179,7 @@ def slot_of(part: object) -> Slot[Any]:
     """
     slot = getattr(part, "slot", None)
     if not isinstance(slot, Slot):
-        name = part.__name__ if isinstance(part, type) else type(part).__name__
+        name = getattr(part, "__name__", type(part).__name__)
         raise InputError(
             f"{name} derives from no kind of part; derive it from rotorfault.Controller, Wind, Fault, Estimator ..."
         )

@@ -23,7 +23,7 @@ from rotorfault.base.foreign import is_place
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
-from rotorfault.plant.ground import GROUND, LARGEST_STEP
+from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.part import Part, field_of
 from rotorfault.scenario.slots import SLOTS
@@ -135,11 +135,11 @@ class Scenario(Strict):
             )
         if self.maybe(GROUND) is None and self[ON_FAULT].kind == "land":
             raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
-        if self.maybe(GROUND) is not None and self.period / self.substeps > LARGEST_STEP * (1.0 + PERIOD_TOLERANCE):
-            raise refusal(
-                "step",
-                f"got {self.period / self.substeps:g} s; allowed with ground: up to {LARGEST_STEP:g} s, for contact is stiff",
-            )
+        if (ground := self.maybe(GROUND)) is not None:
+            step, longest = self.period / self.substeps, ground.make().longest_step()
+            if step > longest * (1.0 + PERIOD_TOLERANCE):
+                allowed = f"allowed with this ground: up to {longest:g} s, for contact is stiff"
+                raise refusal("step", f"got {step:g} s; {allowed}")
         if self.duration < self.period:
             raise refusal("duration", f"got {self.duration:g} s; allowed: at least one period, {self.period:g} s")
         if not self.duration / self.period < 5e7:

@@ -92,7 +92,8 @@ def space_of(controller: str) -> Space:
     for key, (low, start, high) in ranges.items():
         if not 0.0 < low <= start <= high or low == high:
             raise InputError(
-                f"{controller}: search['{key}'] is {(low, start, high)}; allowed: lowest, start, highest, above 0 and in order"
+                f"{controller}: search['{key}'] is {(low, start, high)}; "
+                "allowed: lowest, first and highest value, above 0 and in order"
             )
     return [(key, *bounds) for key, bounds in ranges.items()]
 

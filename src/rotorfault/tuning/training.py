@@ -133,5 +133,5 @@ def _settling(error: Array, times: Array, onset: float, k: int) -> float:
     late = (after[-1] + 1) * every if len(after) else 0.0
     left = LEFT_WEIGHT * float(excess[-1])
     if first < onset - every:
-        return float(first + late + max(0.0, float(excess[k:].max()) - EXCURSION_FREE) + left)
+        return float(first + late + max(0.0, float(excess[k:].max(initial=0.0)) - EXCURSION_FREE) + left)
     return float(INTERRUPTED * onset + late + left)

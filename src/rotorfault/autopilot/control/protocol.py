@@ -56,7 +56,7 @@ class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):
     Attributes
     ----------
     search : mapping
-        Settings that ``rotorfault tune`` may search, by dotted key: lowest value, start and highest value, all above 0.
+        Settings that ``rotorfault tune`` may search, by dotted key: lowest, first and highest value, above 0.
     """
 
     search: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
