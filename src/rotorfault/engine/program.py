@@ -112,29 +112,34 @@ def trace(batch: Batch) -> Traced:
     return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
 
 
-_PROVEN: dict[tuple[str, ...], set[int]] = {}  # by a loop's skeleton: floats of its own parts that are no structure
+def same_code(one: Batch, *others: Batch) -> bool:
+    """Whether batches can be flown as one, by the same compiled code.
 
-
-def same_code(one: Batch, other: Batch) -> bool:
-    """Whether two batches can be flown as one, by the same compiled code.
-
-    Parts from outside the package may use a float of their settings anywhere. Where two loops differ in such floats
-    alone, both are traced: if the floats are parameters, as they should be, the traces are equal.
+    Parts from outside the package may use a float of their settings anywhere. Where loops differ in such floats
+    alone, they are traced, once for each set of floats: if the floats are parameters, as they should be, the traces
+    are equal. Nothing is kept for the next time, for a class of the same name may then be another one.
 
     Parameters
     ----------
-    one, other : Batch
+    one, *others : Batch
     """
-    (words, numbers), (others, more) = skeleton(one.loop), skeleton(other.loop)
-    if words != others or len(numbers) != len(more):
-        return False
-    differ = {place for place, (a, b) in enumerate(zip(numbers, more, strict=True)) if a != b}
-    if differ <= _PROVEN.get(words, set()):
+    words, numbers = skeleton(one.loop)
+    kinds = [type(part) for _, part in one.loop.each()]
+    unlike: dict[tuple[float, ...], Batch] = {}
+    for other in others:
+        other_words, other_numbers = skeleton(other.loop)
+        if other_words != words or any(
+            type(part) is not kind for (_, part), kind in zip(other.loop.each(), kinds, strict=True)
+        ):
+            return False
+        if other_numbers != numbers:
+            unlike[other_numbers] = other
+    if not unlike:
         return True
-    if any(part.python_only for _, part in one.loop.each()) or _written(one) != _written(other):
+    if any(part.python_only for _, part in one.loop.each()):
         return False
-    _PROVEN[words] = _PROVEN.get(words, set()) | differ
-    return True
+    written = _written(one)
+    return all(_written(other) == written for other in unlike.values())
 
 
 def _written(batch: Batch) -> list[Any]:

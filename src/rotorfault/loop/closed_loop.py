@@ -211,9 +211,10 @@ class ClosedLoop:
         )
         air = self.plant.wind.at(0.0, held.wind, numbers.wind)
         truth = self.plant.observe(plant, held, air, 0.0, plant_numbers)
-        inputs = _sensed(truth, 0.0, _normals(start.normals, "sensors"))
-        sensors = self.sensors.initial(inputs, numbers.sensors)
-        readings = self.sensors.step(sensors, inputs, numbers.sensors, parameters.period)[1]
+        sensors = self.sensors.initial(_sensed(truth, 0.0, _normals(start.normals, "sensors")), numbers.sensors)
+        # Read as at the first step, which reads them once more.
+        sensed = _sensed(truth, 0.0, _normals(drive.normals, "sensors"))
+        readings = self.sensors.step(sensors, sensed, numbers.sensors, parameters.period)[1]
         autopilot = self.autopilot.initial(readings, drive.reference, parameters.belief, numbers, parameters.period)
         return LoopState(plant, self._kept(held, sensors), autopilot, self.scoring.initial(), 0.0)
 
