@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
-from rotorfault.base.foreign import in_one_line, is_place
+from rotorfault.base.foreign import in_one_line, is_place, load
 from rotorfault.base.text_table import table_lines
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, no_watch
@@ -112,13 +112,10 @@ def _part(part: str | type[AnyBlock] | AnyBlock | Part[Any], settings: dict[str,
     if isinstance(part, str):
         if not is_place(part):
             raise InputError(f"part: got '{part}'; allowed: a class, an object, or a place such as FILE.py:NAME")
-        for slot in SLOTS:
-            try:
-                return part_from(slot, {"kind": part, **_some(slot, settings)}, allow=True)
-            except InputError as error:
-                if " is a " not in str(error):
-                    raise
-        raise InputError(f"part: '{part}' is of no kind that has a slot")
+        thing = load(part, "part")
+        adapting = (slot for slot in SLOTS if slot.adapt is not None and slot.adapt(thing) is not None)
+        slot = next(adapting, None) or slot_of(thing)
+        return part_from(slot, {"kind": part, **_some(slot, settings)}, allow=True)
     slot = slot_of(part)
     if isinstance(part, Block):
         return Part(slot, type(part).__name__, part.settings, factory=lambda _: part)  # type: ignore[arg-type]

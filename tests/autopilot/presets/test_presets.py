@@ -102,7 +102,7 @@ def test_using_one_changes_none() -> None:
 
 
 def test_its_name_goes_with_the_flight(tmp_path: Path) -> None:
-    """Into label, summary and file; and a file flies again with the settings that it holds, whatever presets say now."""
+    """Into label, summary and file; a file flies again with the settings that it holds, whatever presets say now."""
     table = {"kind": "smc", "preset": "paper", "cascade": {"tilt_max": 0.3}}
     flight = rotorfault.fly(short(controller=table, duration=0.05), engine="python")
     assert flight.label == "smc (paper)"
