@@ -32,11 +32,10 @@ from rotorfault.engine.batch import Array, Batch, columns
 from rotorfault.loop.closed_loop import LoopState
 from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, Scores, ScoringParameters
 from rotorfault.loop.scoring import Scoring
+from rotorfault.maths.arrays import ANGLES, AXES
 from rotorfault.maths.records import unflatten
 from rotorfault.model.telemetry import Signal
 
-AXES = ("x", "y", "z")
-ANGLES = ("roll", "pitch", "yaw")
 GIVEN_UP = ("tilt", "thrust", "yaw")
 ROTORS = ("1", "2", "3", "4")
 LANDING = (
