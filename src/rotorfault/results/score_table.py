@@ -103,10 +103,11 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
     parameters: ScoringParameters = numbers.scoring
     scoring, dt = batch.loop.scoring, np.asarray(numbers.period, dtype=float)
     onsets = batch.loop.onsets(numbers.parts)
-    lasted = (scores.over == 0.0) & (flown.steps >= batch.steps)
-    outcome = np.where((scores.over > 0.0) | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
+    over, steps = np.asarray(scores.over) > 0.0, np.asarray(flown.steps)
+    lasted = ~over & (steps >= batch.steps)
+    outcome = np.where(over | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
     survived = np.isin(outcome, SURVIVED)
-    end_time = np.where(scores.over > 0.0, scores.end, flown.steps) * dt
+    end_time = np.where(over, scores.end, steps) * dt
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 / np.where(scores.seen > 0.0, scores.seen, np.nan)
         table: Columns = {"outcome": outcome, "survived": survived, "end_time": end_time}
