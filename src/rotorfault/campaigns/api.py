@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -14,12 +14,10 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.executors import executor_of
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import differences, replay
+from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, changed, load_study, sources_of, study_from
 from rotorfault.flight.flight import Flight
-
-if TYPE_CHECKING:
-    from rotorfault.campaigns.report.maps import Maps
 
 Say = Callable[[str], None]
 
@@ -59,8 +57,6 @@ class Campaign:
 
     def maps(self) -> Maps:
         """Success rates, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
-        from rotorfault.campaigns.report.maps import maps
-
         return maps(self.study, self.table())
 
     def report(self) -> list[Path]:

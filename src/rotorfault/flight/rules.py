@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, final, get_args
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.base.foreign import in_one_line
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, Recording, drive_rows, drive_template, no_watch
@@ -37,7 +38,7 @@ class Check(NamedTuple):
 
 
 def scenario_with(part: Part[Any], **others: Any) -> Scenario:
-    """A short flight, away from rest, in which a part has its slot; all others are defaults, but for a cheap law.
+    """A short flight, away from rest, in which a part has its slot; all others are the defaults.
 
     Parameters
     ----------
@@ -54,7 +55,6 @@ def scenario_with(part: Part[Any], **others: Any) -> Scenario:
         "seed": 5,
         "start": {"position": [0.1, -0.1, 0.2], "attitude": [0.1, -0.2, 0.3], "velocity": [0.1, 0.2, 0.0]},
         "reference": {"kind": "set_point", "position": [0.2, 0.1, 0.3]},
-        "controller": "smc",
         **others,
     }
     if part.slot.name == "on_fault":
@@ -234,7 +234,7 @@ class Rules:
     def _passes_nan(self) -> str:
         """A state that is not a number must reach the command, and so end the flight, whatever the part does."""
         # Without a diagnosis, by which it would reach the command too.
-        batch = assemble(scenario_with(self.part, diagnosis="off"))
+        batch = assemble(scenario_with(self.part, **{DIAGNOSIS.name: DIAGNOSIS.calm}))
         lost = unflatten(batch.state.plant, [math.nan] * len(flatten(batch.state.plant)))
         _, command, _ = batch.loop.decide(batch.state._replace(plant=lost), next(_drives(batch)), batch.parameters)
         _require(
