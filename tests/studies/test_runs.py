@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import rotorfault as rf
+from rotorfault.engine import have_simd
 from rotorfault.studies.paper import study
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, run_of
 from rotorfault.studies.pool import fly_missing
@@ -124,7 +125,8 @@ def test_one_case_and_controller_alone() -> None:
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("case", list(CASES))
 def test_every_case_survives_with_both_faults_at_1_ms(case: str, controller: str, tmp_path: Path) -> None:
-    pytest.importorskip("heyoka", reason="up to 120,000 steps take minutes without it")
+    if not have_simd():
+        pytest.skip("needs llvmlite: up to 120,000 steps take minutes without it")
     summary = RunStore(tmp_path).get(run_of(case, controller)).summary
     assert summary["survived"] is True
     assert [hit["rotor"] for hit in summary["detections"]] == [1, 3]
