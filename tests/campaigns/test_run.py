@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from campaign_studies import TINY
+from gates import needs_simd
+from places import SOURCE
 
 import rotorfault
 from rotorfault.base.errors import InputError
@@ -27,10 +29,8 @@ from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
-from rotorfault.engine import have_simd
 
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
-SOURCE = str(Path(rotorfault.__file__).parents[1])
+pytestmark = needs_simd
 
 
 def tiny(**tables: Any) -> Study:
@@ -127,7 +127,7 @@ def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, und
         "print('complete', flush=True)\n"
     )
     folder, draw = tmp_path / "campaign", random.Random(3)
-    environment = {**os.environ, "PYTHONPATH": SOURCE}
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
     for _ in range(3):
         child = subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=subprocess.PIPE)
         assert child.stdout is not None
@@ -187,14 +187,16 @@ def test_identifiers_name_flights() -> None:
 
 def test_a_replay_is_the_flight_of_the_table() -> None:
     study = tiny()
-    flights = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int)).part(slice(0, 72, 7))
-    table = fly_block(study, flights)
-    for row in table.to_pylist():
+    flights = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int)).part(slice(0, 72, 5))
+    outcomes = set()
+    for row in fly_block(study, flights).to_pylist():
         flight = replay(study, row["id"])
-        assert flight.outcome.kind == row["outcome"] or row["outcome"] in ("settled", "offset")
+        outcomes.add(row["outcome"])
+        assert flight.outcome.kind == row["outcome"], row["id"]
         summary = flight.summary()
         assert summary["cost"] == pytest.approx(row["cost"], rel=1e-12)
         assert summary["tilt_max"] == pytest.approx(row["tilt_max"], rel=1e-12)
+    assert outcomes >= {"settled", "offset", "tumbled"}
 
 
 # ------------------------------------------------------------------------------------------------------- refusals

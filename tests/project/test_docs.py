@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import typer.main
+from markdown import FENCE, anchors
 from places import DOCS, ROOT, SOURCE
 
 import rotorfault as rf
@@ -24,12 +25,11 @@ from rotorfault.campaigns.study import study_from
 from rotorfault.cli.catalogue import REGISTRIES, entries
 from rotorfault.cli.main import app
 from rotorfault.flight.fly import prepare
-from rotorfault.scenario.scenario import scenario_from
 from rotorfault.scenario.overrides import parse_overrides
+from rotorfault.scenario.scenario import scenario_from
 
 PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
 TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGE_OF = {
     "references": "scenarios.md",
     "winds": "scenarios.md",
@@ -74,12 +74,6 @@ def blocks(*languages: str) -> Iterator[tuple[Path, str]]:
 
 def ticked(path: Path) -> list[str]:
     return re.findall(r"`([^`\n]+)`", prose(path))
-
-
-def anchors(path: Path) -> set[str]:
-    """The anchors of a page's headings, as GitHub makes them."""
-    headings = re.findall(r"^#+ (.+)$", FENCE.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
 
 
 def section(page: str, kind: str) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.studies.paper import study
@@ -121,10 +122,10 @@ def test_one_case_and_controller_alone() -> None:
         study.selected(None, "sdre")
 
 
+@needs_simd
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("case", list(CASES))
 def test_every_case_survives_with_both_faults_at_1_ms(case: str, controller: str, tmp_path: Path) -> None:
-    pytest.importorskip("heyoka", reason="up to 120,000 steps take minutes without it")
     summary = RunStore(tmp_path).get(run_of(case, controller)).summary
     assert summary["survived"] is True
     assert [hit["rotor"] for hit in summary["detections"]] == [1, 3]
