@@ -74,7 +74,7 @@ def neighbours(count: int, controller: str) -> str:
     flights = rf.fly_all([rf.neighbour(base, seed=i) for i in range(count)])
     survived, settled, flagged = 0, 0, 0
     for flight in flights:
-        data, onset = flight.data, flight.scenario.fault[0].settings.time
+        data, onset = flight.data, flight.scores["onset.1"]
         step = np.abs(data["position_reference"].values[0] - data["position"].values[0])
         outside = (np.abs(data["position"].values - data["position_reference"].values) > 0.02 * step).any(axis=1)
         time = data["time"].values

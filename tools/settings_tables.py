@@ -1,4 +1,4 @@
-"""The tables of docs/ that repeat what the code knows: settings, keys of files, signals, what vehicles can bear.
+"""The tables of docs/ that repeat what the code knows: settings, presets, keys of files, signals, attainable hover.
 
     python tools/settings_tables.py                     print every table with its name
     python tools/settings_tables.py controllers/smc     print one
@@ -23,16 +23,19 @@ from pydantic_core import PydanticUndefined
 
 from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
 from rotorfault.autopilot.control.cascade import CascadeSettings
-from rotorfault.cli.catalogue import REGISTRIES
+from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
-from rotorfault.model.telemetry import RPY, quantities
+from rotorfault.maths.rotation import Quat
+from rotorfault.model.slot import Slot, telemetry_of
+from rotorfault.model.telemetry import RPY, Signal, signals_of
 from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
-from rotorfault.scenario.scenario import Mismatch, Scenario, Start
-from rotorfault.scenario.part import Part
+from rotorfault.scenario.part import DEFAULT_PRESET, NO_PRESET, Part
+from rotorfault.scenario.scenario import Mismatch, Start, scenario_fields
+from rotorfault.scenario.slots import SLOTS
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
-__all__ = ["BLOCK", "DOCS", "Setting", "settings", "tables", "updated"]
+__all__ = ["BLOCK", "DOCS", "Setting", "part_settings", "settings", "tables", "updated"]
 
 
 class Setting(NamedTuple):
@@ -60,7 +63,7 @@ def settings(model: type[BaseModel], prefix: str = "") -> Iterator[Setting]:
             for setting in settings(inner, f"{prefix}{name}."):
                 if isinstance(defaults, BaseModel):
                     # What counts is the default of the outer model, which fills the inner one.
-                    value = defaults
+                    value: Any = defaults
                     for part in setting.key.removeprefix(f"{prefix}{name}.").split("."):
                         value = getattr(value, part, PydanticUndefined)
                     setting = setting if value is PydanticUndefined else setting._replace(default=_value(value))
@@ -127,7 +130,7 @@ def _allowed(field: FieldInfo) -> str:
     if kind is float:
         return f"number{bounds}"
     if get_origin(kind) is tuple and Ellipsis not in options and options:
-        metadata = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
+        metadata: list[Any] = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
         return f"{len(options)} numbers{_bounds(metadata)}"
     if get_origin(kind) is tuple:
         return "list of tables"
@@ -148,20 +151,37 @@ def _bounds(metadata: list[Any]) -> str:
 def tables() -> dict[str, str]:
     """Every table under its name, as Markdown."""
     found: dict[str, str] = {}
-    for group, registry in REGISTRIES.items():
-        for kind, part in registry.items():
-            model = getattr(part, "Settings", None)
-            if model is None:
-                continue
-            own = model.model_fields.get("law") if group == "controllers" else None
-            rows = settings(own.annotation, "law.") if own is not None else settings(model)
-            found[f"{group}/{kind}"] = _settings_table(list(rows))
+    for slot in SLOTS:
+        for kind in slot.registry:
+            found[f"{slot.group}/{kind}"] = _settings_table(part_settings(slot, kind))
+        if slot.presets is not None:
+            found[f"presets/{slot.group}"] = _presets_table(slot)
     found["cascade"] = _settings_table(list(settings(CascadeSettings, "cascade.")))
     found["scenario"] = _settings_table(list(_scenario()))
     found["vehicle"] = _vehicle_table()
-    found["signals"] = _signals_table()
+    found["signals"] = _loop_signals_table()
+    found["signals/parts"] = _part_signals_table()
     found["attainable"] = _attainable_table()
     return found
+
+
+def part_settings(slot: Slot[Any], kind: str) -> list[Setting]:
+    """All settings of a part; of a law in the cascade only the law's own, for the cascade has a table to itself."""
+    own = slot.registry[kind].Settings
+    law = _inner(own.model_fields["law"].annotation)[0] if {"law", "cascade"} <= set(own.model_fields) else None
+    return list(settings(own) if law is None else settings(law, "law."))
+
+
+def _presets_table(slot: Slot[Any]) -> str:
+    """Which presets each kind has, and with which it flies if none is named."""
+    assert slot.presets is not None
+    rows = []
+    for kind in slot.registry:
+        known = slot.presets(kind)
+        if known:
+            first = DEFAULT_PRESET if DEFAULT_PRESET in known else NO_PRESET
+            rows.append([f"`{kind}`", ", ".join(f"`{name}`" for name in (*known, NO_PRESET)), f"`{first}`"])
+    return _markdown([slot.registry.sort, "presets", "if none is named"], rows)
 
 
 def _settings_table(rows: list[Setting]) -> str:
@@ -172,24 +192,28 @@ def _settings_table(rows: list[Setting]) -> str:
 
 
 def _scenario() -> Iterator[Setting]:
-    parts = {"reference", "wind", "fault", "sensors", "controller", "diagnosis", "allocation", "on_fault"}
-    inside = {"start": Start, "mismatch": Mismatch}
-    for name, field in Scenario.model_fields.items():
+    inside: dict[str, type[BaseModel]] = {"start": Start, "mismatch": Mismatch}
+    for name, field in scenario_fields().items():
         if name in inside:
             for setting in settings(inside[name], f"{name}."):
                 factor = f"factor on the true {setting.meaning}" if name == "mismatch" else setting.meaning
                 yield setting._replace(meaning=factor)
-        elif name in parts:
-            default = "required" if field.is_required() else "none" if name == "fault" else f"`{field.default}`"
-            allowed = "list of tables with `kind`" if name == "fault" else "table with `kind`, or a bare name"
-            yield Setting(name, default, allowed, "", field.description or "")
+        elif name in SLOTS:
+            yield _slot_setting(SLOTS[name], field)
         elif name == "vehicle":
             yield Setting(name, "required", "name, path, or a vehicle's tables", "", "the vehicle")
-        elif name == "plant":
-            names = ", ".join(f"`{plant}`" for plant in REGISTRIES["plants"])
-            yield Setting(name, _value(field.default), names, "", "model of the body")
         else:
             yield _setting(name, field)
+
+
+def _slot_setting(slot: Slot[Any], field: FieldInfo) -> Setting:
+    """The key of a kind of part."""
+    empty = slot.many or slot.optional
+    default = "required" if field.is_required() else "none" if empty else f"`{slot.default}`"
+    allowed = "list of tables with `kind`" if slot.many else "table with `kind`, or a bare name"
+    if slot.shorthand is not None:
+        allowed = "table with `kind`, a bare name, or a number"
+    return Setting(slot.name, default, allowed, "", slot.about)
 
 
 def _vehicle_table() -> str:
@@ -216,14 +240,35 @@ def _without_unit(text: str, unit: str) -> str:
     return text or "acceleration of free fall"
 
 
-def _signals_table() -> str:
+def _loop_signals_table() -> str:
+    """What the loop records of itself."""
+    recorded = {LoopSignals: "always", GroundSignals: "with `ground`", LandingSignals: "with `on_fault` = `land`"}
+    rows = [_signal_row(signal, when) for kind, when in recorded.items() for signal in signals_of(kind)]
+    return _markdown(["signal", "over time and", "unit", "frame", "recorded", "meaning"], rows)
+
+
+def _part_signals_table() -> str:
+    """What parts record of themselves, each signal once with the kinds that have it."""
     rows = []
-    for name, (kind, about) in quantities().items():
-        angular = "angle" if about.frame == RPY else "axis"
-        dims = {Vec3: angular, PerRotor: "rotor", Mat3: "angle, angle_2"}.get(kind, "")
-        frame = "angles" if about.frame == RPY else about.frame.partition(":")[0]
-        rows.append([f"`{name}`", dims, "" if about.unit == "1" else about.unit, frame, about.meaning])
-    return _markdown(["signal", "over time and", "unit", "frame", "meaning"], rows)
+    for slot in SLOTS:
+        signals: dict[str, Signal] = {}
+        kinds: dict[str, list[str]] = {}
+        for kind in slot.registry:
+            for signal in signals_of(telemetry_of(slot.registry[kind]), slot.name):
+                signals.setdefault(signal.name, signal)
+                kinds.setdefault(signal.name, []).append(kind)
+        for name, signal in signals.items():
+            every = len(slot.registry) > 1 and kinds[name] == list(slot.registry)
+            rows.append(_signal_row(signal, "all" if every else ", ".join(f"`{kind}`" for kind in kinds[name])))
+    return _markdown(["signal", "over time and", "unit", "frame", "recorded by", "meaning"], rows)
+
+
+def _signal_row(signal: Signal, recorded: str) -> list[str]:
+    about = signal.quantity
+    angular = "angle" if about.frame == RPY else "axis"
+    dims = {Vec3: angular, Quat: "component", PerRotor: "rotor", Mat3: "angle, angle_2"}.get(signal.kind, "")
+    frame = "angles" if about.frame == RPY else about.frame.partition(":")[0]
+    return [f"`{signal.name}`", dims, "" if about.unit == "1" else about.unit, frame, recorded, about.meaning]
 
 
 def _attainable_table() -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cascade_step import CONTROLLERS, estimate
 from scipy.linalg import expm
 
 from rotorfault.analysis.linearisation import linearise
@@ -18,12 +19,12 @@ from rotorfault.analysis.sampling_check import (
     sampled_poles,
 )
 from rotorfault.analysis.trim import hover_loop
+from rotorfault.autopilot.control import ControlInputs
 from rotorfault.autopilot.control.cascade import Cascade
 from rotorfault.autopilot.control.ismc import Ismc
-from rotorfault.autopilot.control.protocol import CONTROLLERS
 from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.maths.geometry import Vec3, zeros
-from rotorfault.model.signals import Measurement, Reference, Wrench
+from rotorfault.model.signals import Estimate, Reference, Wrench, healthy
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.scenario.library import load_scenario
 
@@ -113,7 +114,7 @@ def test_a_controller_that_reports_nothing_is_not_stepped(paper_vehicle: Vehicle
     class Counter:
         calls = 0
 
-        def update(self, time: float, m: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
+        def update(self, time: float, seen: Estimate, reference: Reference, vehicle: Vehicle) -> Wrench:
             self.calls += 1
             return Wrench(0.0, zeros())
 
@@ -127,14 +128,34 @@ def test_gains_at_the_start_are_checked(paper_vehicle: Vehicle) -> None:
 
     class Far(Cascade):
         def step(self, memory: Any, inputs: Any, parameters: Any, dt: float) -> Any:
-            after, output = super().step(memory, inputs, parameters, dt)
-            far = 1.0 + 1e3 * inputs.measurement.p_W.z
-            told = output.telemetry
-            return after, output._replace(telemetry=told._replace(gain_position=told.gain_position * far))
+            after, output, told = super().step(memory, inputs, parameters, dt)
+            far = 1.0 + 1e3 * inputs.estimate.p_W.z
+            return after, output, told._replace(gain_position=told.gain_position * far)
 
     settings = CONTROLLERS["ismc"].Settings()
-    controller = Far(Ismc(settings.law), settings.cascade)
-    start = Measurement(Vec3(0.0, 0.0, 5.0), zeros(), zeros(), zeros())
+    controller = Far(Ismc(settings.law), settings.cascade, CONTROLLERS["ismc"].Telemetry)
+    start = estimate(Vec3(0.0, 0.0, 5.0), zeros(), zeros(), zeros())
     assert sampled_data_check(controller, paper_vehicle, 0.001) == []
     lines = sampled_data_check(controller, paper_vehicle, 0.001, start)
     assert any(line.startswith("z at the start") for line in lines)
+
+
+def test_what_it_shows_a_controller_hovers(paper_vehicle: Vehicle) -> None:
+    """The trial steps are those of a vehicle whose rotors carry it: it feels its weight, and no rotor is at fault."""
+    shown: list[ControlInputs] = []
+
+    class Watching(Cascade):
+        def step(self, memory: Any, inputs: Any, parameters: Any, dt: float) -> Any:
+            shown.append(inputs)
+            return super().step(memory, inputs, parameters, dt)
+
+    kind = CONTROLLERS["ismc"]
+    controller = Watching(Ismc(kind.Settings().law), kind.Settings().cascade, kind.Telemetry)
+    scenario = load_scenario("paper-set-point", {"start.position": [0.0, 0.0, 1.0]})
+    sampled_data_warnings(scenario, controller)
+    assert {inputs.estimate.p_W.z for inputs in shown} >= {0.0, 1.0}
+    for inputs in shown:
+        assert inputs.estimate.specific_force_B == Vec3(0.0, 0.0, paper_vehicle.gravity)
+        assert inputs.diagnosis == healthy()
+        assert inputs.expected_thrust.sum() == pytest.approx(paper_vehicle.mass * paper_vehicle.gravity)
+        assert inputs.command * paper_vehicle.rotor_gain == inputs.expected_thrust

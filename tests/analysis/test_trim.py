@@ -6,39 +6,24 @@ import math
 
 import numpy as np
 import pytest
+from cascade_step import CONTROLLERS
 from scipy.linalg import expm
+from spring import Spring
 
 from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.analysis.linearisation import AXES, LinearLoop, linearise
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.trim import hover, hover_loop, trim_report
-from rotorfault.autopilot.control.protocol import CONTROLLERS
 from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.base.errors import InputError
 from rotorfault.cli.losses import parse_losses
 from rotorfault.flight.assembly import assemble
-from rotorfault.loop.closed_loop import Start, quiet
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.model.signals import Command, Measurement, Reference, Wrench
+from rotorfault.model.signals import Command, Estimate, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.scenario.library import load_scenario
 
 T = 0.002
-HOVER = Reference(zeros(), zeros(), zeros(), 0.0, 0.0, 0.0)
-
-
-class Spring:
-    """Constant gains on all axes, position held in the small through the attitude; nothing remembered."""
-
-    def __init__(self, k1: float = 90.0, k2: float = 14.0) -> None:
-        self.k1, self.k2 = k1, k2
-
-    def update(self, time: float, m: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
-        g = vehicle.gravity
-        wanted = m.p_W * -1.5 + m.v_W * -2.2
-        demand = Vec3(-wanted.y / g, wanted.x / g, 0.0)
-        turn = (m.attitude - demand) * -self.k1 + m.omega_B * -self.k2
-        return Wrench(vehicle.mass * (g - 6.0 * m.p_W.z - 4.0 * m.v_W.z), turn.times(vehicle.inertia))
 
 
 def sampled(k1: float, k2: float, lag: float, period: float, drag: float = 0.0) -> tuple[np.ndarray, ...]:
@@ -133,7 +118,7 @@ def test_poles_of_constant_gains_are_known(paper_vehicle: Vehicle, spring: Linea
 
 
 def test_what_does_not_act_is_left_out(spring: LinearLoop) -> None:
-    assert {"steps", "autopilot.elapsed", "scores.cost"} <= set(spring.left_out)
+    assert {"steps", "autopilot.past.elapsed", "scores.cost"} <= set(spring.left_out)
     assert not [name for name in spring.left_out if name.startswith("plant.")]
     assert spring.residual < 1e-10
 
@@ -141,8 +126,8 @@ def test_what_does_not_act_is_left_out(spring: LinearLoop) -> None:
 def test_a_riccati_gain_is_left_out_and_a_surface_kept(paper_vehicle: Vehicle) -> None:
     kind = CONTROLLERS["roismc"]
     linear = linearise(*hover_loop(paper_vehicle, kind(kind.Settings()), 0.001))
-    assert "autopilot.control.attitude.gain.Y.xx" in linear.left_out
-    assert "autopilot.control.attitude.surface.nominal_rate.x" in linear.names
+    assert "autopilot.parts.controller.attitude.gain.Y.xx" in linear.left_out
+    assert "autopilot.parts.controller.attitude.surface.nominal_rate.x" in linear.names
     for axis, m in margins(linear).items():
         check_margins(linear, axis, m)
 
@@ -161,7 +146,7 @@ def test_floats_and_arrays_linearise_alike(paper_vehicle: Vehicle) -> None:
 def test_an_offset_hover_is_found(paper_vehicle: Vehicle) -> None:
     """With a true mass that the autopilot does not know, hover is lower: m' g = m (g + 6 dz)."""
     loop, parameters = hover_loop(paper_vehicle, PythonController(Spring()), T)
-    heavy = parameters._replace(plant=parameters.plant._replace(vehicle=paper_vehicle._replace(mass=1.77 * 1.1)))
+    heavy = parameters._replace(vehicle=paper_vehicle._replace(mass=1.77 * 1.1))
     linear = linearise(loop, heavy)
     assert linear.residual < 1e-9
     A, b, K = sampled(6.0 / 1.1, 4.0 / 1.1, 50.0, T, 0.141 / 1.77 / 1.1)
@@ -192,9 +177,9 @@ class Hoarder(Spring):
 
     total = 0.0
 
-    def update(self, time: float, m: Measurement, reference: Reference, vehicle: Vehicle) -> Wrench:
-        self.total += m.p_W.z
-        wrench = super().update(time, m, reference, vehicle)
+    def update(self, time: float, seen: Estimate, reference: Reference, vehicle: Vehicle) -> Wrench:
+        self.total += seen.p_W.z
+        wrench = super().update(time, seen, reference, vehicle)
         return wrench._replace(thrust=wrench.thrust - self.total)
 
 
@@ -273,14 +258,16 @@ def test_the_delay_margin_holds_in_flight(paper_vehicle: Vehicle) -> None:
 
     def swing(delay: int) -> tuple[float, float]:
         """Largest yaw in the second and in the last half second of two and a half."""
-        state = loop.initial(Start(zeros(), zeros(), Vec3(0.0, 0.0, 0.01), zeros()), quiet(HOVER), parameters)
+        drive, start = loop.drive(), loop.level_start(zeros())._replace(attitude=Vec3(0.0, 0.0, 0.01))
+        state = loop.initial(start, drive, parameters)
         asked, yaws = [0.0] * delay, []
         for k in range(round(2.5 / T)):
-            after, signals = loop.step(state, quiet(HOVER), parameters)
+            after, _, signals = loop.decide(state, drive, parameters)
             asked.append(wrench_of(paper_vehicle, signals.thrust_command).torque_B.z)
             change = sign * ((asked[-1 - delay] - asked[-1]) / (4.0 * paper_vehicle.torque_ratio))
             late = Command(signals.thrust_command + change, zeros())
-            state = after._replace(plant=loop.plant.step(state.plant, late, k * T, parameters.plant, T))
+            numbers, held = loop.plant_numbers(parameters), loop.held(after)
+            state = after._replace(plant=loop.plant.step(state.plant, late, held, k * T, numbers, T))
             yaws.append(abs(signals.attitude.z))
         half = round(0.5 / T)
         return max(yaws[half : 2 * half]), max(yaws[-half:])

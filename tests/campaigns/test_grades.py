@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorfault.campaigns.grades import GRADES, SUCCESS, grades
+from rotorfault.campaigns.grades import BOUNDED, GRADES, HELD, SUCCESS, YAW, grades
 from rotorfault.loop.scores import SURVIVED
 from rotorfault.results.score_table import ScoreTable
 
@@ -33,6 +33,10 @@ def flight(
         (flight("tracked", 0.4, 0.6), "yaw given up"),
         (flight("offset", 1.9, 0.6), "yaw given up"),
         (flight("offset", 1.9, 0.4), "degraded"),
+        (flight("settled", HELD, YAW), "held"),
+        (flight("offset", BOUNDED, YAW), "degraded"),
+        (flight("offset", 0.1, NAN), "yaw given up"),
+        (flight("offset", NAN, 0.1), "drifted"),
         (flight("offset", 2.1, 0.4), "drifted"),
         (flight("offset", 2.1, 0.6), "drifted"),
         (flight("landed", 5.0, 0.1), "controlled descent"),
@@ -52,4 +56,5 @@ def test_grades_of_flights(numbers: dict[str, object], grade: str) -> None:
 def test_grades_are_no_outcomes() -> None:
     """What happened and how good it was have words of their own."""
     assert not set(GRADES) & {*SURVIVED, "ground", "tumbled", "diverged", "interrupted"}
-    assert set(SUCCESS) < set(GRADES)
+    assert SUCCESS == ("held", "yaw given up", "degraded")
+    assert (*SUCCESS, "controlled descent", "drifted", "crashed", "lost") == GRADES

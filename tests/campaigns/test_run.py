@@ -19,16 +19,18 @@ from gates import needs_simd
 from places import SOURCE
 
 import rotorfault
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import InputError
 from rotorfault.base.executors import InProcess
 from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
-from rotorfault.campaigns.replay import identifier_of, replay
+from rotorfault.campaigns.replay import differences, identifier_of
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
+from rotorfault.scenario.library import load_scenario
 
 pytestmark = needs_simd
 
@@ -185,20 +187,6 @@ def test_identifiers_name_flights() -> None:
     )
 
 
-def test_a_replay_is_the_flight_of_the_table() -> None:
-    study = tiny()
-    flights = next_round(study, np.zeros((2, 9), dtype=int), np.zeros((2, 9), dtype=int)).part(slice(0, 72, 5))
-    outcomes = set()
-    for row in fly_block(study, flights).to_pylist():
-        flight = replay(study, row["id"])
-        outcomes.add(row["outcome"])
-        assert flight.outcome.kind == row["outcome"], row["id"]
-        summary = flight.summary()
-        assert summary["cost"] == pytest.approx(row["cost"], rel=1e-12)
-        assert summary["tilt_max"] == pytest.approx(row["tilt_max"], rel=1e-12)
-    assert outcomes >= {"settled", "offset", "tumbled"}
-
-
 # ------------------------------------------------------------------------------------------------------- refusals
 
 
@@ -257,6 +245,26 @@ def test_built_in_studies_can_be_flown(name: str, vehicle: str | None) -> None:
     table = fly_block(short, flights)
     assert table.num_rows == 2
     assert set(table["variant"].to_pylist()) == {"roismc", "smc"}
+
+
+@pytest.mark.parametrize("name", study_names())
+def test_a_preset_in_place_of_the_studys_is_that_of_every_variant(name: str) -> None:
+    study = changed(load_study(name), preset="gentle").resolved()
+    for scenario, kind in zip(study.scenarios, ("roismc", "smc"), strict=True):
+        asked = load_scenario("hover-fault", {"controller.kind": kind, "controller.preset": "gentle"})
+        assert scenario[CONTROLLER] == asked[CONTROLLER]
+
+
+def test_presets_on_an_axis_are_flown() -> None:
+    settings = {**TINY["settings"], "fault.0.loss": 0.2}
+    study = tiny(axis=[{"name": "preset", "values": ["tuned", "gentle"]}], draw=[], settings=settings).resolved()
+    table = fly_block(study, FlightSet(np.array([0, 0]), np.array([0, 1]), np.array([0, 0])))
+    assert len(set(table["control_total_variation"].to_pylist())) == 2
+    for row in table.to_pylist():
+        flight = rotorfault.fly(
+            "hover-fault", settings={**settings, "controller.preset": row["preset"], "seed": row["seed"]}
+        )
+        assert differences(row, flight.scores) == []
 
 
 def test_from_python(tmp_path: Path) -> None:

@@ -241,14 +241,6 @@ def test_bad_file_is_one_clear_line(what: str, old: str, new: str, named: list[s
     assert_refused(run("check", edited(tmp_path, what, old, new)), named)
 
 
-def test_a_controller_s_file_shadows_no_module(tmp_path: Path) -> None:
-    path = tmp_path / "json.py"
-    path.write_text("class Mine:\n    pass\n")
-    mine = cli._own_controller(f"{path}:Mine")
-    assert sys.modules["json"] is json
-    assert vars(sys.modules[type(mine).__module__])["Mine"] is type(mine)
-
-
 def test_truncated_files_are_refused(tmp_path: Path) -> None:
     path = rf.fly("paper-set-point", settings={"duration": 0.01}).save(tmp_path / "flight.nc")
     whole = path.read_bytes()

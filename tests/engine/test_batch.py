@@ -11,7 +11,7 @@ from engine_flights import Array, case_one, every_engine, run, short
 from rotorfault.base.errors import InputError
 from rotorfault.engine import cache
 from rotorfault.engine.batch import CHUNK, Batch, Recording
-from rotorfault.engine.noise import Noise
+from rotorfault.engine.noise import Noise, Stream
 from rotorfault.flight.assembly import assemble_all
 from rotorfault.maths.records import leaf_names
 from rotorfault.scenario.neighbours import neighbour
@@ -123,10 +123,11 @@ def test_a_flight_that_is_over_stops_costing(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_noise_belongs_to_the_flight() -> None:
     seeds = ((7, 0), (7, 4711), (8, 0))
-    together = Noise(seeds).draw(40)
+    stream = Stream(12, 0)
+    together = Noise(seeds, stream).draw(40)
     assert together.shape == (40, 12, 3)
     for i, seed in enumerate(seeds):
-        alone = Noise((seed,))
+        alone = Noise((seed,), stream)
         pieces = np.concatenate([alone.draw(1), alone.draw(29), alone.draw(10)])  # in whatever pieces it is drawn
         np.testing.assert_array_equal(pieces[:, :, 0], together[:, :, i])
     assert np.abs(np.corrcoef(together.reshape(480, 3).T) - np.eye(3)).max() < 0.2

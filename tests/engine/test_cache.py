@@ -7,17 +7,20 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from engine_flights import run, short
 from places import SOURCE
+from pydantic import Field
 
 import rotorfault
+from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.base.errors import InputError
 from rotorfault.engine import cache
 from rotorfault.engine.structure import structure
-from rotorfault.flight.assembly import assemble
+from rotorfault.flight.assembly import assemble, assemble_all
 
 
 class Compiler:
@@ -121,6 +124,7 @@ def test_the_key_tells_structures_apart() -> None:
 
     base = digest()
     assert digest() == base
+    assert digest(diagnosis={"kind": "delayed", "delay": 0.1}) == digest(diagnosis={"kind": "delayed", "delay": 0.2})
     assert digest(seed=9, fault=[{"kind": "step", "rotor": 2, "time": 0.2, "loss": 0.3}]) == base
     others = [
         digest(fault=[{"kind": "step", "rotor": 3, "time": 0.1, "loss": 0.2}]),
@@ -128,7 +132,8 @@ def test_the_key_tells_structures_apart() -> None:
         digest(controller={"kind": "smc", "preset": "none", "law": {"switching": "discontinuous"}}),
         digest(controller={"kind": "smc", "preset": "none", "cascade": {"six_inputs": True}}),
         digest(diagnosis={"kind": "delayed", "delay": 0.1}),
-        digest(diagnosis={"kind": "delayed", "delay": 0.2}),
+        digest(diagnosis="oracle"),
+        digest(reference={"kind": "set_point", "position": [0.2, -0.1, 0.3]}, ground=-1.0),
         digest(plant="paper_model"),
         digest(step=0.001),
         digest(sensors="ideal"),
@@ -138,23 +143,18 @@ def test_the_key_tells_structures_apart() -> None:
     assert len({base, *others}) == 1 + len(others)
 
 
-class ArrayGains:
+class ArrayGains(rotorfault.Controller):
     """A block from outside the package whose numbers lie in an array that it keeps to itself."""
 
     def __init__(self, gains: Any) -> None:
+        super().__init__()
         self.gains = np.asarray(gains)
 
-    def parameters(self, vehicle: Any, period: float) -> tuple[()]:
-        return ()
-
-    def initial(self, measurement: Any, reference: Any, parameters: Any) -> tuple[()]:
-        return ()
-
     def step(self, memory: Any, inputs: Any, parameters: Any, dt: Any) -> Any:
-        climb = (inputs.reference.p_W.z - inputs.measurement.p_W.z) * self.gains[0].item()
+        climb = (inputs.reference.p_W.z - inputs.estimate.p_W.z) * self.gains[0].item()
         nothing = rotorfault.Vec3(0.0, 0.0, 0.0)
         wrench = rotorfault.Wrench(inputs.vehicle.mass * (inputs.vehicle.gravity + climb), nothing)
-        return memory, rotorfault.ControlOutput(wrench, nothing, rotorfault.no_telemetry())
+        return memory, rotorfault.ControlOutput(wrench), rotorfault.Nothing()
 
 
 def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,7 +170,66 @@ def test_numbers_hidden_in_a_block_of_ones_own_are_seen(compiler: Compiler, monk
     assert compiler.count == 2, "the same numbers were compiled before"
 
 
+class Gain(NamedTuple):
+    """Number of a climb."""
+
+    gain: float
+
+
+def climbs(baked: bool) -> type[rotorfault.Controller[Any, Any]]:
+    """A class of one's own as it is before and after an edit: the number of its settings a parameter, or baked in."""
+
+    class Climb(rotorfault.Controller):
+        """Height by a gain."""
+
+        class Settings(rotorfault.Settings):
+            """How much."""
+
+            gain: float = Field(default=1.0, description="gain [1/s^2]")
+
+        def parameters(self, context: Any) -> Gain:
+            return Gain(self.settings.gain)
+
+        def step(self, memory: Any, inputs: Any, parameters: Gain, dt: Any) -> Any:
+            gain = self.settings.gain if baked else parameters.gain
+            climb = (inputs.reference.p_W.z - inputs.estimate.p_W.z) * gain
+            wrench = rotorfault.Wrench(
+                inputs.vehicle.mass * (inputs.vehicle.gravity + climb), rotorfault.Vec3(0, 0, 0)
+            )
+            return memory, rotorfault.ControlOutput(wrench), rotorfault.Nothing()
+
+    return Climb
+
+
+def test_an_edited_class_is_not_taken_for_what_it_was() -> None:
+    """In a notebook a class is run, edited and run again under its name; its numbers must be looked at anew."""
+    registry = CONTROLLER.registry
+    try:
+        for baked in (False, True, False):
+            registry.add("climb", climbs(baked))
+            scenario = short(controller="climb", fault=[], duration=0.1)
+            many = rotorfault.fly_many(
+                scenario, {"controller.gain": [1.0, 9.0, 4.0]}, engine="numpy", record=["position.z"]
+            )
+            for i, gain in enumerate((1.0, 9.0, 4.0)):
+                alone = rotorfault.fly(scenario, settings={"controller.gain": gain}, engine="python")
+                np.testing.assert_allclose(many.signals[:, 0, i], alone.data["position"].values[:, 2], atol=1e-12)
+            unlike = [short(controller={"kind": "climb", "gain": gain}) for gain in (1.0, 1.0, 9.0)]
+            if baked:
+                with pytest.raises(InputError, match="differs from the first in more than numbers"):
+                    assemble_all(unlike)
+            else:
+                assert assemble_all(unlike).flights == 3
+    finally:
+        registry.remove("climb")
+
+
 def test_structure_is_one_word_per_part() -> None:
-    words = structure(assemble(short()).loop)
-    assert all(isinstance(word, str) for word in words)
-    assert "RigidBody" in words[0]
+    """In the order of the slots; of several in one slot each, and besides them the reference and the steps."""
+    faults = [{"kind": "total", "rotor": rotor, "time": 0.1} for rotor in (2, 4)]
+    *parts, _, substeps, floats = structure(assemble(short(fault=faults)).loop)
+    slots = [word.partition(":")[0] for word in parts]
+    truth, belief = ["wind", "fault", "fault", "plant", "sensors"], ["estimator", "diagnosis", "on_fault"]
+    assert slots == [*truth, *belief, "controller", "allocation"]
+    assert "RigidBody" in parts[slots.index("plant")]
+    assert (substeps, floats) == ("1", "()"), "all parts are the package's own, whose floats are numbers"

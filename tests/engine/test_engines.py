@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine_flights import Array, assert_same, case_one, every_engine, run, short
+from cascade_step import cascade
+from engine_flights import OWN, Array, assert_same, case_one, every_engine, run, short
 from gates import needs_simd
 
 import rotorfault
-from rotorfault.autopilot.control.cascade import Cascade, CascadeSettings, limited_force
-from rotorfault.autopilot.control.sdre import Sdre, Weights
+from rotorfault.autopilot.control.cascade import limited_force
 from rotorfault.base.errors import InputError
 from rotorfault.engine import default_engine, have_simd, load_engine
 from rotorfault.engine.batch import CHUNK
 from rotorfault.flight.assembly import assemble_all
 from rotorfault.maths.geometry import Vec3
-from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.model.block import Context
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.neighbours import neighbour
 
@@ -25,8 +25,8 @@ from rotorfault.scenario.neighbours import neighbour
 def test_python_agrees_with_simd(simd_case_one: Array) -> None:
     """4 s of case 1 with both faults at 1.8 s."""
     found = run(case_one(duration=4.0), "python").signals
-    assert found[-1, SIGNAL_NAMES.index("fault_flag.r1"), 0] == 1.0
-    assert found[-1, SIGNAL_NAMES.index("fault_flag.r3"), 0] == 1.0
+    assert found[-1, OWN.rows.index("fault_flag.r1"), 0] == 1.0
+    assert found[-1, OWN.rows.index("fault_flag.r3"), 0] == 1.0
     assert_same(found, simd_case_one)
 
 
@@ -36,8 +36,8 @@ def test_numpy_agrees_with_simd() -> None:
     base = case_one(duration=3.0, period=0.002, step=0.002)
     batch = assemble_all([base, neighbour(base, 3, onset=(1.0, 1.0))])
     found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
-    assert found.shape == (1500, len(SIGNAL_NAMES), 2)
-    assert (found[-1, SIGNAL_NAMES.index("fault_flag.r1")] == 1.0).all()
+    assert found.shape == (1500, len(batch.loop.layout), 2)
+    assert (found[-1, OWN.rows.index("fault_flag.r1")] == 1.0).all()
     assert_same(found, wanted)
 
 
@@ -47,8 +47,7 @@ def test_force_limit_stays_real_on_compiled_code() -> None:
     from rotorfault.engine.function import CompiledFunction
 
     vehicle = load_vehicle("paper").vehicle
-    cascade = Cascade(Sdre(Weights()), CascadeSettings())
-    numbers = cascade.parameters(vehicle, 1e-3)
+    numbers = cascade("sdre").parameters(Context(vehicle, 1e-3))
 
     def limited(force: Vec3, share: Any) -> Vec3:
         return limited_force(force, 4.0 * vehicle.thrust_max, vehicle, numbers._replace(thrust_share=share))
@@ -62,7 +61,7 @@ def test_force_limit_stays_real_on_compiled_code() -> None:
 
 
 @every_engine
-def test_late_measurements_fly_the_same_on_all_engines(engine: str) -> None:
+def test_late_readings_fly_the_same_on_all_engines(engine: str) -> None:
     late = short(sensors={"kind": "noisy", "delay": 3})
     assert_same(run(late, engine).signals, run(late, "python").signals)
 

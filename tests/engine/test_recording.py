@@ -70,9 +70,9 @@ def test_a_lost_flight_is_data(engine: str) -> None:
     good = short(sensors="ideal")
     batch = assemble_all([good, good])
     # Mass is a row of the parameters like any other.
-    vehicle = batch.parameters.plant.vehicle
-    dead = batch.parameters.plant._replace(vehicle=vehicle._replace(mass=np.array([0.0, vehicle.mass[1]])))
-    signals = run(batch._replace(parameters=batch.parameters._replace(plant=dead)), engine).signals
+    vehicle = batch.parameters.vehicle
+    dead = batch.parameters._replace(vehicle=vehicle._replace(mass=np.array([0.0, vehicle.mass[1]])))
+    signals = run(batch._replace(parameters=dead), engine).signals
     assert not np.isfinite(signals[-1, POSITION, 0]).any()
     np.testing.assert_array_equal(signals[:, :, 1], run(good, engine).signals[:, :, 0])
 

@@ -51,8 +51,8 @@ def test_attitude_at_rest_balances_the_wind(flight: rf.Flight) -> None:
 
 
 def test_sliding_variable_starts_at_zero(flight: rf.Flight) -> None:
-    assert np.abs(flight.data["sigma_position"].values[0]).max() == 0.0
-    assert np.abs(flight.data["sigma_attitude"].values[0]).max() == 0.0
+    assert np.abs(flight.data["controller.sigma_position"].values[0]).max() == 0.0
+    assert np.abs(flight.data["controller.sigma_attitude"].values[0]).max() == 0.0
 
 
 def test_riccati_residual_stays_small(flight: rf.Flight) -> None:

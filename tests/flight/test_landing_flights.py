@@ -72,7 +72,9 @@ def test_on_fault_continue_flies_as_if_there_were_no_ground() -> None:
     flight = rf.fly("land-after-fault", settings={"on_fault": "continue", "duration": 4.0, "record_period": 0.01})
     assert flight.outcome.survived
     assert flight.summary()["landing"] is None
-    assert (flight.data["landing_stage"].values == 0.0).all()
+    assert (flight.data["ground_force"].values == 0.0).all()
+    assert (flight.data["position_reference"].values == 2.0).all()
+    assert "landing_stage" not in flight.data, "a response that cannot land has no such signal"
 
 
 @pytest.mark.parametrize("engine", ["python", "numpy"])
@@ -114,5 +116,5 @@ def test_the_choice_is_one_of_structure() -> None:
 def test_landing_needs_ground_and_a_fine_step() -> None:
     with pytest.raises(rf.InputError, match=r"on_fault: got 'land' without ground; give its height"):
         rf.load_scenario("paper-set-point", {"on_fault": "land"})
-    with pytest.raises(rf.InputError, match=r"step: got 0.01 s; allowed with ground: up to 0.005 s"):
+    with pytest.raises(rf.InputError, match=r"step: got 0.01 s; allowed with this ground: up to 0.005 s"):
         rf.load_scenario("land-after-fault", {"period": 0.01, "step": 0.01})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,10 @@ import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rotorfault.autopilot.allocation import ALLOCATORS
-from rotorfault.autopilot.allocation.protocol import settings_class
+from rotorfault.autopilot.allocation import ALLOCATION, AllocationInputs
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
+from rotorfault.model.block import Context
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench, healthy
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
@@ -29,12 +30,22 @@ VEHICLES["stretched"] = PAPER._replace(
     rotor_gain=1.2,
 )
 each_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
-each_allocator = pytest.mark.parametrize("name", list(ALLOCATORS))
+each_allocator = pytest.mark.parametrize("name", list(ALLOCATION.registry))
 
 
 def make(name: str) -> Any:
-    allocator = ALLOCATORS[name]
-    return allocator(settings_class(allocator)())
+    kind = ALLOCATION.registry[name]
+    return kind(kind.Settings())
+
+
+def allocate(allocator: Any, vehicle: Vehicle, demand: Wrench, diagnosis: Diagnosis) -> Allocation:
+    """What an allocator, or the one of this name, makes of a demand; the last command is no number."""
+    made = make(allocator) if isinstance(allocator, str) else allocator
+    numbers = made.parameters(Context(vehicle, 1e-3))
+    inputs = AllocationInputs(demand, diagnosis, vehicle, PerRotor.all(math.nan))
+    found: Allocation
+    _, found, _ = made.step(made.initial(inputs, numbers), inputs, numbers, 1e-3)
+    return found
 
 
 def belief(*loss: float) -> Diagnosis:

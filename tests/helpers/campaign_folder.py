@@ -66,6 +66,11 @@ def undisturbed() -> pa.Table:
     return pa.concat_tables(pieces).combine_chunks()
 
 
+def missing(store: Store, blocks: list[Key]) -> list[Key]:
+    done = store.done()
+    return [key for key in blocks if key not in done]
+
+
 def everything(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
@@ -75,11 +80,11 @@ WRITER = """
 import os, random, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {helpers!r})
-from campaign_folder import BLOCKS, STUDY, Store, results, start
+from campaign_folder import BLOCKS, STUDY, Store, missing, results, start
 folder = Path({folder!r})
 known = (folder / "study.json").exists()
 store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
-blocks = store.missing([(r, b) for r in range(3) for b in range(100)])
+blocks = missing(store, [(r, b) for r in range(3) for b in range(100)])
 random.Random({seed}).shuffle(blocks)
 {trap}
 for key in blocks:

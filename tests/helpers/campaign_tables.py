@@ -27,32 +27,32 @@ def study_of(axis: list[dict[str, Any]], **tables: Any) -> Study:
 
 
 def table_of(study: Study, share: Share, flown: Flown = lambda label, cell: FIRST) -> pa.Table:
-    """A table in which of a cell's flights the first ones survive, rounded to the share; the lost ones tumble."""
+    """A table in which the first flights of a cell are successful, rounded to the share, and the others are lost."""
     rows = []
     for k, variant in enumerate(study.variant):
         for cell in range(study.cells):
             place = tuple(int(i) for i in np.unravel_index(cell, study.shape))
             count = flown(variant.label, cell)
-            survivors = round(share(variant.label, place) * count)
+            successes = round(share(variant.label, place) * count)
             for number in range(count):
-                survived = number < survivors
+                success = number < successes
                 rows.append(
                     {
                         "variant": variant.label,
                         "cell": cell,
                         "number": number,
                         "id": (number * study.cells + cell) * len(study.variant) + k,
-                        "survived": survived,
-                        "grade": ("tracked", "degraded")[number % 2] if survived else "tumbled",
-                        "recovery_time": 0.1 * (number + 1) if survived else np.nan,
-                        "altitude_lost": 0.01 * (number + 1) if survived else 5.0,
+                        "success": success,
+                        "grade": ("held", "degraded")[number % 2] if success else "lost",
+                        "recovery_time": 0.1 * (number + 1) if success else np.nan,
+                        "altitude_lost": 0.01 * (number + 1) if success else 5.0,
                     }
                 )
     return pa.Table.from_pylist(rows)
 
 
 def falling(label: str, place: tuple[int, ...]) -> float:
-    """Survival that falls along the first axis, later for the first variant."""
+    """A success rate that falls along the first axis, later for the first variant."""
     return float(np.clip(1.5 - 0.5 * place[0] + (0.25 if label == "one" else 0.0), 0.0, 1.0))
 
 

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from rotorfault.engine import ENGINES, load_engine
 from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.flight.assembly import assemble
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.scenario.scenario import Scenario, scenario_from
+from rotorfault.loop.recorded import LoopSignals
+from rotorfault.model.telemetry import Layout, signals_of
 from rotorfault.scenario.library import load_scenario
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 Array = NDArray[np.float64]
-POSITION = slice(SIGNAL_NAMES.index("position.x"), SIGNAL_NAMES.index("position.x") + 3)
+OWN = Layout(signals_of(LoopSignals))  # the loop's own signals: the first rows of every recording
+POSITION = OWN.place("position")
 SPREAD = 5e-9  # relative, over all signals: rates and switching inputs are large and steep
 _NEEDS = {"simd": [needs_simd]}
 every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
@@ -56,4 +58,5 @@ def assert_same(found: Array, wanted: Array) -> None:
     assert np.abs(found[:, POSITION] - wanted[:, POSITION]).max() <= 1e-9
     size = np.maximum(1.0, np.abs(wanted).max(axis=0, keepdims=True))
     worst = np.abs(found - wanted) / size
-    assert worst.max() <= SPREAD, SIGNAL_NAMES[int(np.argmax(worst.max(axis=(0, 2))))]
+    row = int(np.argmax(worst.max(axis=(0, 2))))
+    assert worst.max() <= SPREAD, OWN.rows[row] if row < len(OWN) else f"row {row}, of a part"

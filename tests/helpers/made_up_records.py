@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from rotorfault.flight.assembly import build
 from rotorfault.model.telemetry import Layout
-from rotorfault.results.dataset import as_dataset
+from rotorfault.results.dataset import as_dataset, as_flight_data
 from rotorfault.results.flight_data import flight_data
+from rotorfault.results.netcdf import write_netcdf
 from rotorfault.scenario.library import load_scenario
 
 Array = NDArray[np.float64]
@@ -26,3 +28,8 @@ def rows_of(name: str) -> slice | int:
 def dataset(signals: Array, time: Array, attributes: dict[str, Any]) -> xr.Dataset:
     """Records of shape (records, rows) at these times [s] as a flight's dataset."""
     return as_dataset(flight_data(LAYOUT, signals, time, attributes))
+
+
+def save(data: xr.Dataset, path: Path) -> None:
+    """Write such a flight."""
+    write_netcdf(as_flight_data(data), path)

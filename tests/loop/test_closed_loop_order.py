@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from engine_flights import OWN
 from numpy.typing import NDArray
 
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.plant import PLANTS
+from rotorfault.plant import PLANT
 from rotorfault.scenario.scenario import scenario_from
 
 Array = NDArray[np.float64]
 PERIOD = 0.01
-TRUTH = [k for k, name in enumerate(SIGNAL_NAMES) if name.partition(".")[0] in ("position", "velocity", "attitude")]
+TRUTH = [k for k, name in enumerate(OWN.rows) if name.partition(".")[0] in ("position", "velocity", "attitude")]
 
 
 def flown(substeps: int, fault_time: float = 0.3, **tables: Any) -> Array:
@@ -61,7 +61,7 @@ def orders(**changes: Any) -> tuple[Array, Array]:
     return errors, np.log2(errors[:-1] / errors[1:])
 
 
-@pytest.mark.parametrize("plant", list(PLANTS))
+@pytest.mark.parametrize("plant", list(PLANT.registry))
 @pytest.mark.parametrize("controller", ["smc", "ismc"])
 def test_fourth_order(plant: str, controller: str) -> None:
     errors, slopes = orders(plant=plant, controller={"kind": controller, "preset": "none"})

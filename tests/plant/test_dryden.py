@@ -1,4 +1,4 @@
-"""Gusts: their statistics against the spectra of the standard, and what they may not change.
+"""Gusts: their statistics against the spectra of the standard, and their mean wind.
 
 The filters are looked at from outside: gusts that came out, or the response of the block to single numbers put in.
 Neither the filters' states nor their coefficients are named here.
@@ -12,25 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gates import needs_simd
 from numpy.typing import NDArray
+from plant_flights import part
 from scipy import linalg, signal
 
-from rotorfault.base.errors import InputError
-from rotorfault.engine import load_engine
-from rotorfault.engine.batch import CHUNK, drive_rows, no_watch
-from rotorfault.engine.noise import FIRST_GUST, GUSTS, SENSOR_NOISE, Noise
-from rotorfault.engine.structure import structure
-from rotorfault.flight.assembly import assemble, assemble_all
-from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, unflatten
-from rotorfault.model.signals import Command
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.plant import WINDS, FirstNormals, no_first_normals
-from rotorfault.scenario.scenario import Scenario, scenario_from
+from rotorfault.model.block import Context
+from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.plant import WIND
+from rotorfault.plant.timed import TimeInputs
 
 Array = NDArray[np.float64]
-WIND = slice(SIGNAL_NAMES.index("wind.x"), SIGNAL_NAMES.index("wind.x") + 3)
+VEHICLE = load_vehicle("paper").vehicle
 AXES = ("along", "across", "up")
 MEAN = (6.0, -8.0, 0.0)  # m/s: 10 m/s along (0.6, -0.8)
 H, W20 = 20.0, 15.0  # m, m/s
@@ -39,7 +32,16 @@ each_axis = pytest.mark.parametrize("axis", range(3), ids=AXES)
 
 def dryden(**settings: Any) -> Any:
     given = {"velocity_W": MEAN, "altitude": H, "wind_at_6m": W20} | settings
-    return WINDS["dryden"](WINDS["dryden"].Settings(**given))
+    return part(WIND, "dryden", **given)
+
+
+def numbers_of(wind: Any, period: float = 0.1) -> Any:
+    return wind.parameters(Context(VEHICLE, period))
+
+
+def stepped(wind: Any, memory: Any, normals: Any, numbers: Any, period: float) -> Any:
+    """The memory a sampling period later."""
+    return wind.step(memory, TimeInputs(0.0, tuple(normals)), numbers, period)[0]
 
 
 def expected(altitude: float = H, w20: float = W20) -> tuple[Array, Array]:
@@ -64,29 +66,30 @@ def in_gust_axes(velocity: Array, mean: tuple[float, float, float] = MEAN) -> Ar
 def blow(wind: Any, period: float, steps: int, flights: int, seed: int) -> Array:
     """Gusts at the sampling instants in their own axes, shape (steps + 1, 3, flights); the first before any step."""
     draw = np.random.default_rng(seed)
-    numbers = wind.parameters()
-    memory = wind.initial(unflatten(no_first_normals(), list(draw.standard_normal((6, flights)))), numbers, period)
+    numbers = numbers_of(wind, period)
+    memory = wind.initial(TimeInputs(0.0, tuple(draw.standard_normal((6, flights)))), numbers)
     seen = []
     for k in range(steps + 1):
         seen.append(np.array(flatten(wind.at(k * period, memory, numbers).velocity_W)))
-        memory = wind.step(memory, Vec3.of(draw.standard_normal((3, flights))), numbers, period)
+        memory = stepped(wind, memory, draw.standard_normal((3, flights)), numbers, period)
     return np.moveaxis(in_gust_axes(np.moveaxis(np.array(seen), 1, 0)), 1, 0)
 
 
 def recursion(wind: Any, period: float) -> tuple[Array, Array, Array, Array]:
     """The block as x' = A x + B n, gust = C x, x0 = D m: read off its responses to single ones, for it is linear."""
-    numbers, template = wind.parameters(), wind.initial(no_first_normals(), wind.parameters(), period)
+    numbers = numbers_of(wind, period)
+    template = wind.initial(TimeInputs(0.0, (0.0,) * 6), numbers)
     size = len(flatten(template))
 
     def step(x: Array, n: Array) -> Array:
-        return np.array(flatten(wind.step(unflatten(template, x.tolist()), Vec3.of(n.tolist()), numbers, period)))
+        return np.array(flatten(stepped(wind, unflatten(template, x.tolist()), n.tolist(), numbers, period)))
 
     def gust(x: Array) -> Array:
         air = wind.at(0.0, unflatten(template, x.tolist()), numbers)
         return in_gust_axes(np.array(flatten(air.velocity_W)))
 
     def start(m: Array) -> Array:
-        return np.array(flatten(wind.initial(unflatten(no_first_normals(), m.tolist()), numbers, period)))
+        return np.array(flatten(wind.initial(TimeInputs(0.0, tuple(m.tolist())), numbers)))
 
     rest, still = np.zeros(size), np.zeros(3)
     A = np.column_stack([step(x, still) for x in np.eye(size)])
@@ -200,7 +203,7 @@ def test_intensity_and_scale_at_other_heights(altitude: float) -> None:
 def test_at_a_thousand_feet_turbulence_is_isotropic() -> None:
     """The standard's low-altitude model meets the one above there."""
     sigma, length = expected(304.8)
-    numbers = dryden(altitude=304.8).parameters()
+    numbers = numbers_of(dryden(altitude=304.8))
     assert numbers.sigma_level == pytest.approx(numbers.sigma_up)
     assert numbers.length_level == pytest.approx(numbers.length_up)
     np.testing.assert_allclose([sigma[0], length[0]], [numbers.sigma_up, numbers.length_up], rtol=1e-12)
@@ -209,19 +212,12 @@ def test_at_a_thousand_feet_turbulence_is_isotropic() -> None:
 # -------------------------------------------------------------------------------------------------- the mean wind
 
 
-def test_without_intensity_it_is_the_constant_wind() -> None:
-    """Exactly, flown in closed loop."""
-    still = {"kind": "dryden", "velocity_W": [2.0, -1.0, 0.3], "wind_at_6m": 0.0}
-    steady = {"kind": "constant", "velocity_W": [2.0, -1.0, 0.3]}
-    np.testing.assert_array_equal(run(short(wind=still), "python"), run(short(wind=steady), "python"))
-
-
 def test_without_a_mean_wind_gusts_lie_along_x_and_come_with_the_least_speed() -> None:
     calm = dryden(velocity_W=(0.0, 0.0, 0.0), airspeed_min=2.0)
-    numbers = calm.parameters()
-    memory = calm.initial(FirstNormals(Vec3(1.0, 0.0, 0.0), zeros()), numbers, 0.1)
+    numbers = numbers_of(calm)
+    memory = calm.initial(TimeInputs(0.0, (1.0, *[0.0] * 5)), numbers)
     np.testing.assert_allclose(flatten(calm.at(0.0, memory, numbers).velocity_W), [SIGMA[0], 0.0, 0.0])
-    after = calm.step(memory, zeros(), numbers, 0.1)
+    after = stepped(calm, memory, [0.0] * 3, numbers, 0.1)
     x = calm.at(0.0, after, numbers).velocity_W.x
     assert x == pytest.approx(SIGMA[0] * math.exp(-0.1 * 2.0 / LENGTH[0]))
 
@@ -232,163 +228,5 @@ def test_a_faster_mean_wind_carries_gusts_past_faster() -> None:
     for a, b in zip(slow[:2], fast[:2], strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
     # A vertical mean wind counts as speed, but not as direction.
-    numbers = dryden(velocity_W=(0.0, 3.0, 4.0)).parameters()
+    numbers = numbers_of(dryden(velocity_W=(0.0, 3.0, 4.0)))
     assert (numbers.along_x, numbers.along_y) == (0.0, 1.0)
-
-
-# ------------------------------------------------------------------------------------- in flight: the same numbers
-
-
-def short(**tables: Any) -> Scenario:
-    return scenario_from(
-        {
-            "name": "gusty",
-            "vehicle": "paper",
-            "duration": 0.3,
-            "period": 0.005,
-            "step": 0.005,
-            "seed": 7,
-            "reference": {"kind": "set_point", "position": [0.2, -0.1, 0.3]},
-            "controller": {"kind": "smc", "preset": "none"},
-            "fault": [{"kind": "step", "rotor": 2, "time": 0.1, "loss": 0.2}],
-            "wind": {"kind": "dryden", "wind_at_6m": 15.0, "altitude": 5.0},
-        }
-        | tables,
-        "test",
-    )
-
-
-def run(flown: Scenario, engine: str) -> Array:
-    return load_engine(engine)(assemble(flown), no_watch).signals[:, :, 0]
-
-
-@pytest.mark.parametrize("sensors", ["ideal", "noisy"])
-@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_simd), "numpy", "python"])
-def test_a_flight_does_not_depend_on_its_batch(engine: str, sensors: str) -> None:
-    base = short(sensors=sensors)
-    alone = run(base, engine)
-    others = [
-        short(sensors=sensors, seed=k, wind={"kind": "dryden", "altitude": 3.0 + k, "velocity_W": [k, 1.0, 0.0]})
-        for k in (1, 2, 3, 4)
-    ]
-    together = load_engine(engine)(assemble_all([*others[:2], base, *others[2:]]), no_watch).signals
-    np.testing.assert_array_equal(together[:, :, 2], alone)
-    assert np.isfinite(together).all()
-    assert all(np.abs(together[:, WIND, k] - alone[:, WIND]).max() > 0.1 for k in (0, 1, 3, 4))
-
-
-@needs_simd
-@pytest.mark.parametrize("step", [0.005, 0.0025, 0.001])
-def test_compiled_it_is_the_same_flight(step: float) -> None:
-    """One function for the period, or two where it has many integration steps; over more than one chunk of noise."""
-    flown = short(step=step, duration=0.005 * (CHUNK + 20), sensors="noisy", fault=[])
-    found, wanted = run(flown, "simd"), run(flown, "python")
-    size = np.maximum(1.0, np.abs(wanted).max(axis=0))
-    worst = (np.abs(found - wanted) / size).max(axis=0)
-    assert worst[:3].max() <= 1e-9
-    assert worst[WIND].max() <= 1e-9
-    assert worst.max() <= 5e-9, SIGNAL_NAMES[int(np.argmax(worst))]
-
-
-@pytest.mark.parametrize("engine", [pytest.param("simd", marks=needs_simd), "python"])
-def test_the_air_moves_on_once_in_a_sampling_period(engine: str) -> None:
-    """However many integration steps there are in it."""
-    winds = [run(short(step=0.005 / n, duration=0.1), engine)[:, WIND] for n in (1, 2, 5)]
-    np.testing.assert_allclose(winds[0], winds[1], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(winds[0], winds[2], rtol=0.0, atol=1e-12)
-    assert (np.abs(np.diff(winds[0], axis=0)) > 0.0).all()
-
-
-def test_the_recorded_wind_is_the_block_stepped_by_hand() -> None:
-    flown = short(duration=0.1)
-    batch = assemble(flown)
-    wind, numbers = batch.loop.plant.wind, batch.parameters.plant.wind
-    first = unflatten(no_first_normals(), Noise(batch.seeds, FIRST_GUST).draw(1)[0, :, 0].tolist())
-    memory = wind.initial(first, numbers, 0.005)
-    assert flatten(memory) == flatten(batch.state.plant.air)
-    found = run(flown, "python")[:, WIND]
-    for k, normals in enumerate(Noise(batch.seeds, GUSTS).draw(20)[:, :, 0].tolist()):
-        memory = wind.step(memory, Vec3.of(normals), numbers, 0.005)
-        assert found[k].tolist() == flatten(wind.at(0.0, memory, numbers).velocity_W)
-
-
-def test_gusts_push_by_drag() -> None:
-    """Level in hover, velocity approaches that of the air with the rate k_d/m, period by period."""
-    batch = assemble(short())
-    plant, numbers, T = batch.loop.plant, batch.parameters.plant, 0.005
-    rate = numbers.vehicle.linear_drag / numbers.vehicle.mass
-    state, v = batch.state.plant, np.zeros(3)
-    hover = Command(state.rotors, zeros())
-    for k in range(20):
-        state = plant.blown(state, Vec3(0.3, -1.0, 0.5), numbers, T)
-        air = np.array(flatten(plant.observe(state, k * T, numbers).air.velocity_W))
-        v = air + (v - air) * math.exp(-rate * T)
-        state = plant.step(state, hover, k * T, numbers, T)
-    np.testing.assert_allclose(flatten(plant.observe(state, 0.1, numbers).measurement.v_W), v, atol=1e-9)
-    assert np.abs(v).min() > 1e-3
-
-
-# ------------------------------------------------------------------------------------------------ streams of numbers
-
-
-def rows_of(**tables: Any) -> Array:
-    return np.concatenate([rows for _, rows in drive_rows(assemble(short(duration=0.005 * (CHUNK + 9), **tables)))])
-
-
-def test_gusts_and_sensor_noise_leave_each_other_alone() -> None:
-    """Each has its rows only where it is there, and the same numbers whatever else there is."""
-    none = rows_of(wind="none")
-    gusts, noise, both = rows_of(), rows_of(wind="none", sensors="noisy"), rows_of(sensors="noisy")
-    assert [rows.shape[1] for rows in (none, gusts, noise, both)] == [12, 15, 24, 27]
-    np.testing.assert_array_equal(both[:, :24], noise)
-    np.testing.assert_array_equal(both[:, 24:], gusts[:, 12:])
-    np.testing.assert_array_equal(run(short(sensors="noisy"), "python")[:, WIND], run(short(), "python")[:, WIND])
-
-
-def test_sensor_noise_has_no_words_but_seed_and_index() -> None:
-    wanted = Noise(((7, 4711),)).draw(30)[:, :, 0]
-    np.testing.assert_array_equal(Noise(((8, 0), (7, 4711)), SENSOR_NOISE).draw(30)[:, :, 1], wanted)
-    assert np.abs(Noise(((7, 4711),), GUSTS).draw(30)[:, :, 0] - wanted[:, :3]).min() > 1e-6
-
-
-def test_streams_are_independent() -> None:
-    """Of one flight, and of flights whose seeds are near: no two streams share numbers."""
-    seeds = ((7, 0), (7, 1), (8, 0), (2**33 + 7, 0))
-    count = 6000
-    drawn = [Noise(seeds, stream).draw(count // stream.width) for stream in (SENSOR_NOISE, GUSTS, FIRST_GUST)]
-    columns = np.concatenate([part.reshape(count, len(seeds)).T for part in drawn])
-    assert np.abs(np.corrcoef(columns) - np.eye(len(columns))).max() < 5.0 / math.sqrt(count)
-    pieces = Noise(seeds, GUSTS)
-    again = np.concatenate([pieces.draw(1), pieces.draw(29)])
-    np.testing.assert_array_equal(again, Noise(seeds, GUSTS).draw(30))
-
-
-def test_a_wind_without_memory_has_no_place_in_the_state() -> None:
-    for kind in ("none", "constant", "paper"):
-        state = assemble(short(wind=kind)).state
-        assert flatten(state.plant.air) == []
-    gusty = assemble(short())
-    assert len(flatten(gusty.state)) == len(flatten(state)) + 5
-    assert structure(gusty.loop) == structure(assemble(short(seed=9)).loop)
-
-
-# ------------------------------------------------------------------------------------------------- settings refused
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("altitude", 2.0, "greater than or equal to 3.048; got 2.0"),
-        ("altitude", 400.0, "less than or equal to 304.8; got 400.0"),
-        ("wind_at_6m", -1.0, "greater than or equal to 0; got -1.0"),
-        ("airspeed_min", 0.0, "greater than or equal to 0.1; got 0.0"),
-        ("airspeed_min", math.nan, "finite"),
-        ("heigth", 5.0, "unknown key"),
-    ],
-)
-def test_bad_settings_are_refused_in_one_line(key: str, value: float, words: str) -> None:
-    with pytest.raises(InputError, match=words) as error:
-        short(wind={"kind": "dryden", key: value})
-    message = str(error.value)
-    assert message.startswith(f"test: wind.{key}: ")
-    assert "\n" not in message

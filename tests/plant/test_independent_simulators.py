@@ -13,13 +13,13 @@ import math
 
 import numpy as np
 import pytest
+from plant_flights import array, fault, numbers_of, part, plant_of, step, wind
 
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.records import flatten
 from rotorfault.model.signals import Command, Wrench
 from rotorfault.model.vehicle import rotor_speeds
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.plant import FAULTS, PLANTS, WINDS, Air, Plant
+from rotorfault.plant import PLANT, Air
 from rotorfault.plant.integrator import rk4
 
 # Uneven moments of inertia that a body can have, a gain other than 1, and noticeable drag.
@@ -29,10 +29,6 @@ VEHICLE = load_vehicle("paper").vehicle._replace(
 WIND = (-3.33, 1.36, 0.7)
 SEEDS = range(5)
 DURATION = 0.5
-
-
-def array(record):
-    return np.array(flatten(record), dtype=float)
 
 
 def random_case(seed, vehicle):
@@ -45,14 +41,13 @@ def random_case(seed, vehicle):
     return start, outputs, command
 
 
-def fly_ours(vehicle, start, outputs, command, step, wind=WIND, faults=()):
+def fly_ours(vehicle, start, outputs, command, period, velocity_W=WIND, faults=()):
     """End state as p_W, v_W, q_WB (w first), omega_B, rotor outputs."""
-    air = WINDS["constant"](WINDS["constant"].Settings(velocity_W=wind))
-    plant = Plant(PLANTS["rigid_body"](), air, faults, 1)
-    parameters = plant.parameters(vehicle)
+    plant = plant_of("rigid_body", wind("constant", velocity_W=velocity_W), faults)
+    parameters = numbers_of(plant, vehicle, period)
     state = plant.initial(*start, outputs * vehicle.rotor_gain, parameters)
-    for k in range(round(DURATION / step)):
-        state = plant.step(state, Command(command, zeros()), k * step, parameters, step)
+    for k in range(round(DURATION / period)):
+        state = step(plant, state, Command(command, zeros()), k * period, parameters, period)
     return array(state)
 
 
@@ -92,7 +87,7 @@ def mujoco_model(mujoco, vehicle, step, inside="", actuator="", inertia=None):
 
 def place(data, start):
     p, v, attitude, omega = start
-    q = PLANTS["rigid_body"]().initial(p, v, attitude, omega).q_WB
+    q = part(PLANT, "rigid_body").start(p, v, attitude, omega).q_WB
     data.qpos[:7] = [*p, *q]
     data.qvel[:6] = [*v, *omega]
 
@@ -123,7 +118,8 @@ def test_mujoco_flies_the_same_flight(mujoco, seed):
     vehicle = VEHICLE._replace(rotor_inertia=0.0)
     case = random_case(seed, vehicle)
     differences = [
-        distance(fly_ours(vehicle, *case, step), fly_mujoco(mujoco, vehicle, *case, step)) for step in (4e-3, 2e-3)
+        distance(fly_ours(vehicle, *case, period), fly_mujoco(mujoco, vehicle, *case, period))
+        for period in (4e-3, 2e-3)
     ]
     assert differences[1] < 1e-8
     assert differences[1] < differences[0] / 10.0
@@ -152,7 +148,7 @@ def test_mujoco_feels_the_same_gyroscopic_torque(mujoco, spin):
     inside = f"""<body><joint type="hinge" axis="0 0 1"/>
         <inertial pos="0 0 0" mass="1e-3" diaginertia="{disc / 2.0!r} {disc / 2.0!r} {disc!r}"/></body>"""
     start = (zeros(), zeros(), Vec3(0.3, -0.2, 0.5), Vec3(1.5, -1.0, 2.0))
-    model_ours = PLANTS["rigid_body"]()
+    model_ours = part(PLANT, "rigid_body")
     vehicle = VEHICLE._replace(gravity=0.0, linear_drag=0.0)
 
     def difference(step):
@@ -160,7 +156,7 @@ def test_mujoco_feels_the_same_gyroscopic_torque(mujoco, spin):
         data = mujoco.MjData(model)
         place(data, start)
         data.qvel[6] = spin - start[3].z
-        body = model_ours.initial(*start)
+        body = model_ours.start(*start)
         for _ in range(round(DURATION / step)):
             mujoco.mj_step(model, data)
             body = model_ours.after_step(
@@ -202,7 +198,7 @@ def lossy_multirotor():
 def fly_rotorpy(make, vehicle, start, thrust, faults):
     """End state as `fly_ours` gives it. RotorPy's rotor lag is one of speed, so the speeds are held."""
     p, v, attitude, omega = start
-    q = PLANTS["rigid_body"]().initial(p, v, attitude, omega).q_WB
+    q = part(PLANT, "rigid_body").start(p, v, attitude, omega).q_WB
     speeds = array(rotor_speeds(vehicle, thrust))
     state = {
         "x": array(p), "v": array(v), "q": np.array([q.x, q.y, q.z, q.w]), "w": array(omega),
@@ -237,12 +233,10 @@ def test_rotorpy_flies_the_same_flight(lossy_multirotor, seed, faults):
     vehicle = VEHICLE._replace(rotor_inertia=0.0, linear_drag=0.0, rotor_gain=1.0)
     start, _, command = random_case(seed, vehicle)
     theirs = fly_rotorpy(lossy_multirotor, vehicle, start, command, faults)
-    timeline = [
-        FAULTS["step"](FAULTS["step"].Settings(time=time, rotor=rotor, loss=loss)) for time, rotor, loss in faults
-    ]
+    timeline = [fault("step", time=time, rotor=rotor, loss=loss) for time, rotor, loss in faults]
     differences = [
-        distance(fly_ours(vehicle, start, command, command, step, (0.0, 0.0, 0.0), timeline)[:13], theirs)
-        for step in (1e-2, 5e-3)
+        distance(fly_ours(vehicle, start, command, command, period, (0.0, 0.0, 0.0), timeline)[:13], theirs)
+        for period in (1e-2, 5e-3)
     ]
     assert differences[1] < 1e-7
     assert differences[1] < differences[0] / 10.0

@@ -2,37 +2,29 @@
 
 import numpy as np
 import pytest
+from plant_flights import MODELS, array, fault, numbers_of, part, plant_of, step, truth_of, wind
 
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.model.signals import Command, Wrench
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.plant import FAULTS, PLANTS, WINDS, Air, Plant
+from rotorfault.plant import PLANT, Air
 from rotorfault.plant.integrator import rk4
 
 VEHICLE = load_vehicle("paper").vehicle
 # Three different moments, so that no term of Euler's equations vanishes.
 UNEVEN = VEHICLE._replace(inertia=Vec3(2.16e-3, 3.1e-3, 1.7e-3), linear_drag=0.0)
 STILL = Air(zeros(), zeros())
-MODELS = list(PLANTS)
-
-
-def array(record):
-    return np.array(flatten(record), dtype=float)
-
-
-def part(registry, name, **settings):
-    return registry[name](registry[name].Settings(**settings))
 
 
 def full_plant(model, substeps=1):
     """Every part at once: lag, paper's wind, two faults on step boundaries."""
     faults = [
-        part(FAULTS, "step", rotor=1, time=0.2, loss=0.25),
-        part(FAULTS, "intermittent", rotor=3, start=0.1, end=0.35, period=0.1, duty=0.4, loss=0.3),
-        part(FAULTS, "stuck", rotor=2, time=0.3, thrust=4.0),
+        fault("step", rotor=1, time=0.2, loss=0.25),
+        fault("intermittent", rotor=3, start=0.1, end=0.35, period=0.1, duty=0.4, loss=0.3),
+        fault("stuck", rotor=2, time=0.3, thrust=4.0),
     ]
-    return Plant(PLANTS[model](), part(WINDS, "paper"), faults, substeps)
+    return plant_of(model, wind("paper"), faults, substeps)
 
 
 def tumble_start(plant, parameters):
@@ -52,7 +44,7 @@ COMMAND = Command(PerRotor(4.35, 4.3, 4.36, 4.33), zeros())
 def fly(plant, parameters, steps, period):
     state = tumble_start(plant, parameters)
     for k in range(steps):
-        state = plant.step(state, COMMAND, k * period, parameters, period)
+        state = step(plant, state, COMMAND, k * period, parameters, period)
     return state
 
 
@@ -62,8 +54,8 @@ def fly(plant, parameters, steps, period):
 @pytest.mark.parametrize("residual", [0.0, 150.0])
 def test_torque_free_spin_keeps_angular_momentum_and_energy(residual):
     """With rotors at constant speed their momentum J_r Omega e_z is part of the whole."""
-    model, J = PLANTS["rigid_body"](), UNEVEN.inertia
-    body = model.initial(zeros(), zeros(), Vec3(0.4, -0.3, 0.2), Vec3(3.0, -2.0, 5.0))
+    model, J = part(PLANT, "rigid_body"), UNEVEN.inertia
+    body = model.start(zeros(), zeros(), Vec3(0.4, -0.3, 0.2), Vec3(3.0, -2.0, 5.0))
 
     def momentum_W(b):
         return array(b.q_WB.matrix() @ (J.times(b.omega_B) + Vec3(0.0, 0.0, UNEVEN.rotor_inertia * residual)))
@@ -84,10 +76,10 @@ def test_torque_free_spin_keeps_angular_momentum_and_energy(residual):
 
 
 def test_mechanical_energy_is_kept_in_free_flight_and_falls_with_drag():
-    model = PLANTS["rigid_body"]()
+    model = part(PLANT, "rigid_body")
 
     def total(vehicle):
-        body = model.initial(zeros(), Vec3(3.0, 1.0, 2.0), zeros(), Vec3(3.0, -2.0, 5.0))
+        body = model.start(zeros(), Vec3(3.0, 1.0, 2.0), zeros(), Vec3(3.0, -2.0, 5.0))
 
         def energy(b):
             spin = 0.5 * b.omega_B.dot(vehicle.inertia.times(b.omega_B))
@@ -103,10 +95,10 @@ def test_mechanical_energy_is_kept_in_free_flight_and_falls_with_drag():
 
 
 def test_quaternion_rate_is_tangent_to_the_unit_sphere():
-    model, rng = PLANTS["rigid_body"](), np.random.default_rng(2)
+    model, rng = part(PLANT, "rigid_body"), np.random.default_rng(2)
     for _ in range(20):
         attitude, omega = Vec3.of(rng.normal(size=3)), Vec3.of(rng.normal(size=3) * 10)
-        body = model.initial(zeros(), zeros(), attitude, omega)
+        body = model.start(zeros(), zeros(), attitude, omega)
         dot = model.derivative(body, Wrench(1.0, zeros()), zeros(), VEHICLE, 0.0, STILL)
         assert abs(body.q_WB.dot(dot.q_WB)) < 1e-14
 
@@ -117,7 +109,7 @@ def test_quaternion_rate_is_tangent_to_the_unit_sphere():
 @pytest.mark.parametrize("model", MODELS)
 def test_the_plant_converges_with_order_four_in_its_substeps(model):
     """At a fixed sampling period, with faults on its boundaries, through wind, lag, tumbling and faults."""
-    parameters = full_plant(model).parameters(VEHICLE)
+    parameters = numbers_of(full_plant(model), VEHICLE)
     period, steps = 0.02, 20
 
     def end(substeps):
@@ -133,8 +125,8 @@ def test_the_plant_converges_with_order_four_in_its_substeps(model):
 def test_rigid_body_against_a_taylor_integrator():
     """heyoka's adaptive Taylor method at 1e-15 knows nothing of Runge and Kutta."""
     hy = pytest.importorskip("heyoka")
-    model = PLANTS["rigid_body"]()
-    start = model.initial(zeros(), Vec3(1.0, 0.0, 0.0), Vec3(0.3, 0.2, -0.5), Vec3(1.0, -2.0, 3.0))
+    model = part(PLANT, "rigid_body")
+    start = model.start(zeros(), Vec3(1.0, 0.0, 0.0), Vec3(0.3, 0.2, -0.5), Vec3(1.0, -2.0, 3.0))
     wrench, air = Wrench(17.0, Vec3(2e-3, -3e-3, 1e-3)), Air(Vec3(1.0, 2.0, 0.0), Vec3(0.1, 0.0, 0.0))
 
     def derivative(b):
@@ -165,8 +157,8 @@ def test_the_papers_model_is_the_rigid_body_for_small_angles():
     def difference(amplitude):
         ends = []
         for model in MODELS:
-            plant = Plant(PLANTS[model](), part(WINDS, "paper"), [], 1)
-            parameters = plant.parameters(VEHICLE)
+            plant = plant_of(model, wind("paper"))
+            parameters = numbers_of(plant, VEHICLE)
             state = plant.initial(
                 zeros(),
                 zeros(),
@@ -178,8 +170,9 @@ def test_the_papers_model_is_the_rigid_body_for_small_angles():
             hover = VEHICLE.mass * VEHICLE.gravity / 4.0
             command = Command(PerRotor.all(hover) + PerRotor(1.0, 0.98, 0.99, 1.02) * (0.05 * amplitude), zeros())
             for k in range(500):
-                state = plant.step(state, command, k * 1e-3, parameters, 1e-3)
-            ends.append(array(plant.observe(state, 0.5, parameters).measurement))
+                state = step(plant, state, command, k * 1e-3, parameters)
+            body = truth_of(plant, state, 0.5, parameters).state
+            ends.append(array((body.p_W, body.v_W, body.q_WB.euler(), body.omega_B)))
         return np.abs(ends[0] - ends[1]).max()
 
     assert set(MODELS) == {"paper_model", "rigid_body"}
@@ -191,7 +184,7 @@ def test_the_papers_model_is_the_rigid_body_for_small_angles():
 @pytest.mark.parametrize("model", MODELS)
 def test_a_numpy_batch_equals_single_flights(model):
     plant = full_plant(model)
-    parameters = plant.parameters(VEHICLE)
+    parameters = numbers_of(plant, VEHICLE)
     masses, losses = np.array([1.5, 1.77, 2.0]), np.array([0.0, 0.25, 1.0])
 
     def numbers(mass, loss):
@@ -214,8 +207,8 @@ def symbols(make, plant, parameters):
 
 def step_and_observe(plant, inputs):
     state, command, time, parameters = inputs
-    after = plant.step(state, command, time, parameters, 0.005)
-    return after, plant.observe(after, time + 0.005, parameters)
+    after = step(plant, state, command, time, parameters, 0.005)
+    return after, truth_of(plant, after, time + 0.005, parameters)
 
 
 TIMES = [0.0, 0.1, 0.195, 0.2, 0.235, 0.3, 0.5]
@@ -232,7 +225,7 @@ def compare(plant, parameters, call):
 def test_heyoka_equals_floats(model):
     hy = pytest.importorskip("heyoka")
     plant = full_plant(model, 2)
-    parameters = plant.parameters(VEHICLE)
+    parameters = numbers_of(plant, VEHICLE)
     template, leaves = symbols(lambda name: hy.make_vars(name), plant, parameters)
     outputs = flatten(step_and_observe(plant, unflatten(template, leaves)))
     # The still air's velocity and the like are plain numbers, which heyoka refuses as outputs.
@@ -251,7 +244,7 @@ def test_heyoka_equals_floats(model):
 def test_casadi_equals_floats(model):
     ca = pytest.importorskip("casadi")
     plant = full_plant(model, 2)
-    parameters = plant.parameters(VEHICLE)
+    parameters = numbers_of(plant, VEHICLE)
     template, leaves = symbols(ca.SX.sym, plant, parameters)
     outputs = flatten(step_and_observe(plant, unflatten(template, leaves)))
     function = ca.Function("step", [ca.vertcat(*leaves)], [ca.vertcat(*outputs)])

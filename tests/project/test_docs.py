@@ -19,26 +19,36 @@ from markdown import FENCE, anchors
 from places import DOCS, ROOT, SOURCE
 
 import rotorfault as rf
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.cascade import CascadeSettings
 from rotorfault.base.config import parse_toml
 from rotorfault.campaigns.study import study_from
-from rotorfault.cli.catalogue import REGISTRIES, entries
+from rotorfault.cli.catalogue import entries
 from rotorfault.cli.main import app
 from rotorfault.flight.fly import prepare
+from rotorfault.loop.scores import ENDS, SURVIVED
+from rotorfault.reference import REFERENCE
+from rotorfault.results.score_table import LANDING
 from rotorfault.scenario.overrides import parse_overrides
 from rotorfault.scenario.scenario import scenario_from
+from rotorfault.scenario.slots import SLOTS
 
 PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
 TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}
 PAGE_OF = {
-    "references": "scenarios.md",
-    "winds": "scenarios.md",
-    "faults": "scenarios.md",
+    "reference": "scenarios.md",
+    "wind": "scenarios.md",
+    "fault": "scenarios.md",
+    "ground": "scenarios.md",
+    "plant": "scenarios.md",
     "sensors": "scenarios.md",
-    "diagnoses": "diagnosis.md",
-    "allocators": "allocation.md",
-    "responses": "scenarios.md",
+    "estimator": "scenarios.md",
+    "diagnosis": "diagnosis.md",
+    "allocation": "allocation.md",
+    "on_fault": "scenarios.md",
 }
+"""Page with a section for each kind of a slot; each controller has a page of its own."""
+PARTS = [(slot.name, kind) for slot in SLOTS if slot.name != "controller" for kind in slot.registry]
 TOP = ("src", "docs", "tests", "tools", "examples", "benchmarks")
 
 
@@ -76,17 +86,17 @@ def ticked(path: Path) -> list[str]:
     return re.findall(r"`([^`\n]+)`", prose(path))
 
 
-def section(page: str, kind: str) -> str:
-    """Text below the heading that names a kind, up to the next heading of the same or a higher level."""
+def section(page: str, kind: str, table: str) -> str:
+    """Text below the heading that names a kind and has its table, up to the next heading of its level or above."""
     text = TEXT[DOCS / page]
     title = kind.replace("_", "[_ ]")
     for match in re.finditer(rf"^(#+) {title}\b.*$", text, re.MULTILINE | re.IGNORECASE):
         rest = text[match.end() :]
         end = re.search(rf"^#{{1,{len(match[1])}}} ", rest, re.MULTILINE)
         found = rest[: end.start()] if end else rest
-        if f"/{kind} -->" in found:
+        if f"<!-- table: {table} -->" in found:
             return found
-    raise AssertionError(f"docs/{page} has no section '{kind}' with its settings table")
+    raise AssertionError(f"docs/{page} has no section '{kind}' with the table {table}")
 
 
 # -------------------------------------------------------------------------------------------------------- settings
@@ -98,22 +108,19 @@ def test_tables_are_those_of_the_code(path: Path) -> None:
     assert not wrong, f"{name_of(path)}: {wrong} out of date; run: python tools/settings_tables.py --write"
 
 
-@pytest.mark.parametrize(
-    ("group", "kind"), [(g, k) for g, registry in REGISTRIES.items() if g in PAGE_OF for k in registry]
-)
-def test_every_part_has_a_section_with_all_its_settings(group: str, kind: str) -> None:
-    text = section(PAGE_OF[group], kind)
-    assert f"<!-- table: {group}/{kind} -->" in text
-    for setting in TOOL.settings(REGISTRIES[group][kind].Settings):
+@pytest.mark.parametrize(("slot", "kind"), PARTS)
+def test_every_part_has_a_section_with_all_its_settings(slot: str, kind: str) -> None:
+    text = section(PAGE_OF[slot], kind, f"{SLOTS[slot].group}/{kind}")
+    for setting in TOOL.settings(SLOTS[slot].registry[kind].Settings):
         assert f"`{setting.key}`" in text
 
 
-@pytest.mark.parametrize("kind", list(REGISTRIES["controllers"]))
+@pytest.mark.parametrize("kind", list(CONTROLLER.registry))
 def test_every_controller_has_a_page_with_all_its_settings(kind: str) -> None:
     page, index = DOCS / "controllers" / f"{kind}.md", DOCS / "controllers" / "index.md"
     for title in ("Equations", "Settings", "Presets", "Where it differs from the paper", "When it fails"):
         assert f"\n## {title}\n" in TEXT[page], title
-    law = REGISTRIES["controllers"][kind].Settings.model_fields["law"].annotation
+    law = CONTROLLER.registry[kind].Settings.model_fields["law"].annotation
     for setting in TOOL.settings(law, "law."):
         assert f"`{setting.key}`" in TEXT[page]
     for setting in TOOL.settings(CascadeSettings, "cascade."):
@@ -128,18 +135,26 @@ def test_every_table_stands_somewhere() -> None:
 
 def test_settings_see_into_models_and_lists() -> None:
     """The tool that the tables hang on: nested, in lists, optional, with the outer model's defaults."""
-    found = {s.key: s for s in TOOL.settings(REGISTRIES["controllers"]["roismc"].Settings)}
+    found = {s.key: s for s in TOOL.settings(CONTROLLER.registry["roismc"].Settings)}
     assert found["law.attitude.gamma_0"].default != found["law.position.gamma_0"].default
     layer = found["law.position.layer"]
     assert (layer.default, layer.allowed, layer.unit) == ("`1.0`", "number > 0", "m/s or rad/s")
     assert "[" not in layer.meaning
-    assert "points[].time" in {s.key for s in TOOL.settings(REGISTRIES["references"]["waypoints"].Settings)}
-    assert "law.match.error_floor" in {s.key for s in TOOL.settings(REGISTRIES["controllers"]["smc"].Settings)}
+    assert "points[].time" in {s.key for s in TOOL.settings(REFERENCE.registry["waypoints"].Settings)}
+    assert "law.match.error_floor" in {s.key for s in TOOL.settings(CONTROLLER.registry["smc"].Settings)}
 
 
-@pytest.mark.parametrize("group", ["plants", "vehicles", "engines", "scenarios"])
+def test_every_key_of_a_scenario_is_a_row_of_its_table() -> None:
+    keys = set(re.findall(r"^\| `([a-z_.]+)`", TABLES["scenario"], re.MULTILINE))
+    tables = prepare("land-after-fault").as_tables()
+    inside = {f"{key}.{name}" for key in ("start", "mismatch") for name in tables[key]}
+    optional = {"step", "record_period"}
+    assert keys == (set(tables) - {"start", "mismatch"}) | inside | optional
+
+
+@pytest.mark.parametrize("group", ["vehicles", "engines", "scenarios"])
 def test_what_is_listed_is_named(group: str) -> None:
-    """Plants, vehicles, engines and scenarios, which have no settings."""
+    """Vehicles, engines and scenarios, which have no settings."""
     everything = "".join(TEXT.values())
     missing = [name for name in entries()[group] if not re.search(rf"[`\" ]{re.escape(name)}\b", everything)]
     assert not missing
@@ -150,10 +165,34 @@ def test_summary_and_outcomes_are_defined() -> None:
     settings = {"duration": 0.02, "fault.0.time": 0.0, "fault.1.time": 0.01}
     summary = rf.fly("paper-set-point", settings=settings, engine="python").summary()
     assert summary["detections"]
-    for key in [*summary, *summary["detections"][0]]:
+    for key in [*summary, *summary["detections"][0], *LANDING]:
         assert f"`{key}`" in text, key
-    for outcome in ("settled", "tracked", "offset", "landed", "ground", "tumbled", "diverged", "interrupted"):
+    for outcome in (*SURVIVED, *ENDS[1:], "interrupted"):
         assert f"| `{outcome}` |" in text
+
+
+def test_signals_are_those_of_flights() -> None:
+    """Every signal that is recorded stands in a table with its dimensions, unit and recorder, and no other does."""
+    lines = (TABLES["signals"] + TABLES["signals/parts"]).splitlines()
+    rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
+    seen = set()
+    for kind in CONTROLLER.registry:
+        settings = {"duration": 0.002, "controller.kind": kind}
+        data = rf.fly("land-after-fault", settings=settings, engine="python").data
+        for name, variable in data.data_vars.items():
+            _, _, dims, unit, _, recorded, meaning, _ = rows[str(name)]
+            assert dims == ", ".join(map(str, variable.dims[1:]))
+            assert (unit or "1", meaning) == (variable.attrs["units"], variable.attrs["long_name"])
+            if str(name).startswith("controller."):
+                assert recorded == "all" or f"`{kind}`" in recorded
+            seen.add(str(name))
+    assert seen == {name for name in rows if name not in ("signal", "---")}
+
+
+def test_attributes_of_a_file_are_named() -> None:
+    text = TEXT[DOCS / "scenarios.md"]
+    flight = rf.fly("paper-set-point", settings={"duration": 0.002}, engine="python")
+    assert not [name for name in flight.data.attrs if f"`{name}`" not in text]
 
 
 # ----------------------------------------------------------------------------------------------- links, paths, names
@@ -265,6 +304,8 @@ def test_scenarios_and_parts_in_toml_are_valid() -> None:
     assert found
     for path, body in found:
         tables = parse_toml(body, name_of(path))
+        if ".py:" in body or "project" in tables:
+            continue  # flown by test_examples.py, as the file that it is; and what a user's package says
         if "axis" in tables:
             study_from(tables, name_of(path))
         elif "duration" in tables:

@@ -16,14 +16,15 @@ from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Vec3
 from rotorfault.model.signals import Reference
-from rotorfault.reference.sources import REFERENCES, ReferenceTable
+from rotorfault.reference import REFERENCE
+from rotorfault.reference.sources import ReferenceTable
 
 Array = NDArray[np.float64]
 H = 1e-4  # s, step of the finite differences here
 
 
 def make(kind: str, **settings: Any) -> Any:
-    found: Any = REFERENCES[kind]
+    found: Any = REFERENCE.registry[kind]
     return found(validate(found.Settings, settings, "reference"))
 
 
@@ -83,10 +84,11 @@ def test_shapes_and_rows(kind: str) -> None:
 
 
 def test_each_registered_reference_has_settings_and_a_summary() -> None:
-    assert list(REFERENCES) == ["set_point", "waypoints", "sinusoid", "square", "csv", "function"]
-    for name, kind in REFERENCES.items():
-        assert REFERENCES.summary(name)
-        assert all(field.description for field in kind.Settings.model_fields.values())  # type: ignore[attr-defined]
+    registry = REFERENCE.registry
+    assert list(registry) == ["set_point", "waypoints", "sinusoid", "square", "csv", "function"]
+    for name, kind in registry.items():
+        assert registry.summary(name)
+        assert all(field.description for field in kind.Settings.model_fields.values())
 
 
 def test_set_point_stays() -> None:
@@ -326,16 +328,26 @@ def test_function_is_found_by_its_name(tmp_path: Path, monkeypatch: pytest.Monke
     table = make("function", function="my_ways_for_test:line").table(np.array([1.0]))
     assert table.v_W[0, 0] == pytest.approx(2.0)
     for place, reason in {
-        "my_ways_for_test": "allowed: 'package.module:name'",
-        ":line": "allowed: 'package.module:name'",
-        "my_ways_for_test:none": "has no function 'none'",
-        "my_ways_for_test:number": "has no function 'number'",
+        "my_ways_for_test": "allowed: FILE.py:NAME or package.module:NAME",
+        ":line": "allowed: FILE.py:NAME or package.module:NAME",
+        "my_ways_for_test:none": r"has no 'none' \(it has: line\)",
+        "my_ways_for_test:number": "'my_ways_for_test:number': it is no function; check the name",
         "no_such_module_for_test:line": "cannot import",
         "my_broken_way_for_test:line": "ZeroDivisionError",
     }.items():
         with pytest.raises(InputError, match=reason):
             make("function", function=place)
     sys.modules.pop("my_ways_for_test")
+    table = make("function", function=f"{tmp_path / 'my_ways_for_test.py'}:line").table(np.array([1.0]))
+    assert table.v_W[0, 0] == pytest.approx(2.0)
+
+
+def test_only_a_function_that_is_named_is_code_to_be_allowed() -> None:
+    """One that is handed in was made by whoever hands it in."""
+    settings = REFERENCE.registry["function"].Settings
+    assert settings(function="mine.py:line").code() == ("mine.py:line",)
+    assert settings(function=lambda t: (t, 0.0, 0.0, 0.0)).code() == ()
+    assert REFERENCE.registry["set_point"].Settings(position=(0.0, 0.0, 0.0)).code() == ()
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,31 @@
-"""From a point of the search to settings, and what a training flight is worth."""
+"""From a point of the search to settings, of the laws that are here and of controllers of one's own."""
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
+from places import EXAMPLES
 
-from rotorfault.autopilot.control.protocol import CONTROLLERS
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.riccati import attitude_problem, feedback
 from rotorfault.autopilot.control.riccati_reference import solve_iterated
 from rotorfault.autopilot.control.sdre import Weights
 from rotorfault.base.config import validate
+from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.tuning.space import SPACES, settings_at
+from rotorfault.scenario.part import part_from
+from rotorfault.tuning import search, training
+from rotorfault.tuning.space import SPACES, settings_at, space_of
+
+OWN = f"{EXAMPLES / 'controller.py'}:PdController"
 
 
 @pytest.mark.parametrize("controller", SPACES)
 def test_every_corner_of_a_space_is_a_valid_controller(controller: str) -> None:
-    kind = CONTROLLERS[controller]
+    kind = CONTROLLER.registry[controller]
     for corner in (1, 2, 3):
         tables = settings_at(controller, {entry[0]: entry[corner] for entry in SPACES[controller]})
         validate(kind.Settings, tables, controller)
@@ -24,7 +33,7 @@ def test_every_corner_of_a_space_is_a_valid_controller(controller: str) -> None:
 
 @pytest.mark.parametrize("controller", ["roismc", "ismc"])
 def test_what_is_not_searched_keeps_its_default(controller: str) -> None:
-    kind = CONTROLLERS[controller]
+    kind = CONTROLLER.registry[controller]
     tables = settings_at(controller, {entry[0]: entry[2] for entry in SPACES[controller]})
     ours, default = validate(kind.Settings, tables, controller).law, kind.Settings().law
     for group in ("position", "attitude"):
@@ -47,3 +56,67 @@ def test_attitude_weights_give_the_gains_that_are_searched() -> None:
     K_angle, K_rate = feedback(problem, solve_iterated(problem))
     np.testing.assert_allclose(list(K_angle.diag), [150.0, 150.0, 30.0], rtol=1e-3)
     np.testing.assert_allclose(list(K_rate.diag), [30.0, 30.0, 12.0], rtol=1e-3)
+
+
+# ------------------------------------------------------------------------------------------ controllers of one's own
+
+
+def test_a_controller_of_ones_own_says_what_is_searched() -> None:
+    space = space_of(OWN)
+    assert [entry[0] for entry in space] == ["stiffness", "damping"]
+    for corner in (1, 2, 3):
+        table = settings_at(OWN, {entry[0]: entry[corner] for entry in space})
+        part = part_from(CONTROLLER, {"kind": OWN, **table}, allow=(OWN,))
+        assert [part.settings.stiffness, part.settings.damping] == [entry[corner] for entry in space]
+
+
+BARE = """
+import rotorfault as rf
+
+class Bare(rf.Controller):
+    search = {search}
+"""
+
+
+@pytest.mark.parametrize(
+    ("search_", "message"),
+    [
+        ("{}", r"does not say what to search; its class needs"),
+        ("{'k': (1.0, 0.5, 2.0)}", r"search\['k'\] is \(1.0, 0.5, 2.0\); allowed: lowest, start, highest"),
+        ("{'k': (0.0, 0.5, 2.0)}", "above 0 and in order"),
+        ("{'k': (1.0, 1.0, 1.0)}", "above 0 and in order"),
+    ],
+)
+def test_a_search_that_is_none_is_refused(search_: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "bare.py").write_text(BARE.format(search=search_))
+    with pytest.raises(InputError, match=message) as caught:
+        space_of(f"{tmp_path / 'bare.py'}:Bare")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_registered_controller_without_a_space_is_refused() -> None:
+    with pytest.raises(InputError, match=r"controller 'pid' has no search space; allowed: roismc, .*FILE\.py:NAME"):
+        space_of("pid")
+
+
+@pytest.mark.parametrize("controller", ["smc", OWN])
+def test_what_a_search_gives_is_a_controller_again(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One generation on short flights, one of which ends before its fault: what is written is what was best."""
+    pytest.importorskip("cma")
+    short = (("paper-set-point", {"duration": 3.0}, 2), ("paper-set-point", {"duration": 1.0}, 1))
+    monkeypatch.setattr(training, "GROUPS", short)
+    told: list[tuple[int, float]] = []
+    tuned = search.tune(controller, 1, 4, seed=3, report=lambda done, best: told.append((done, best)))
+    assert told == [(1, pytest.approx(tuned.record["objective"], abs=1e-4))]
+    assert tuned.record["flights_per_candidate"] == 3
+    (best,) = search._evaluate(controller, [tuned.settings], training.training_groups(controller, {}))
+    assert best == pytest.approx(told[0][1], rel=1e-9), "what was best is worth the same alone"
+    read = tomllib.loads(search.as_toml(tuned, "mine"))
+    if controller == OWN:
+        assert read == {"controller": {"kind": OWN, **tuned.settings}}
+        assert part_from(CONTROLLER, read["controller"], allow=(OWN,)).settings.stiffness > 0.0
+    else:
+        assert read["mine"]["record"] == tuned.record
+        part = part_from(CONTROLLER, {"kind": controller, "preset": "none", **tuned.settings})
+        assert {key: value for key, value in read["mine"].items() if key != "record"} == tuned.settings
+        assert part.settings.cascade.tilt_max == tuned.settings["cascade"]["tilt_max"]

@@ -1,7 +1,7 @@
 r"""Can a control law be flown at this sampling period and with these rotors? A cheap check of its gains, per axis.
 
 Laws are designed in continuous time for ideal actuators, :math:`\ddot e = u = -k_1 e - k_2\dot e`; they fly sampled,
-behind rotors that lag. For the gains that a controller reports (`ControlTelemetry`), hence for any controller, the
+behind rotors that lag. For the gains that a controller reports (signals ``gain_position`` and others), the
 nominal axis is therefore closed again through a zero-order hold and a first-order lag, exactly,
 
 .. math:: \frac{d}{dt}\begin{pmatrix} e\\ \dot e\\ a\end{pmatrix} =
@@ -169,7 +169,7 @@ def sampled_data_check(
         return []
     zero = zeros()
     target = Reference(zero, zero, zero, 0.0, 0.0, 0.0)
-    places = [("at the target", at_rest(), target)]
+    places = [("at the target", at_rest(vehicle.gravity), target)]
     if estimate is not None:
         places.append(("at the start", estimate, target if reference is None else reference))
     lines: dict[str, str] = {}
@@ -194,16 +194,20 @@ def sampled_data_warnings(scenario: Scenario, controller: Any = None) -> list[st
     controller : Controller, optional
         Flies in place of the scenario's.
     """
-    s = scenario.start
+    s, vehicle = scenario.start, scenario.vehicle.vehicle
     start = Estimate(
-        Vec3.of(s.position), Vec3.of(s.velocity), Quat.from_euler(Vec3.of(s.attitude)), Vec3.of(s.body_rates)
+        p_W=Vec3.of(s.position),
+        v_W=Vec3.of(s.velocity),
+        q_WB=Quat.from_euler(Vec3.of(s.attitude)),
+        omega_B=Vec3.of(s.body_rates),
+        specific_force_B=Vec3(0.0, 0.0, vehicle.gravity),  # rotors start at hover thrust
     )
     with np.errstate(all="ignore"):  # numbers that are not finite are told of by the flight
         first = scenario[REFERENCE].make().table(np.zeros(1)).at(0)
     reference: Reference = unflatten(first, [float(leaf) for leaf in flatten(first)])
     return sampled_data_check(
         scenario[CONTROLLER].make() if controller is None else controller,
-        scenario.vehicle.vehicle,
+        vehicle,
         scenario.period,
         start,
         reference,

@@ -50,8 +50,8 @@ class Autopilot:
     Parameters
     ----------
     parts : mapping of Slot to Block
-        In the order in which they act: estimator, diagnosis, response, controller, allocation, and whatever else has a
-        slot.
+        In the order in which they act: estimator, diagnosis, response, controller, allocation, and whatever else has
+        a slot.
     """
 
     def __init__(self, parts: Mapping[Slot[Any], AnyBlock]) -> None:
@@ -83,7 +83,8 @@ class Autopilot:
             Sampling period.
         """
         hover = hover_thrust(vehicle)
-        past = Past(rotors_at_hover(vehicle), (), Command(hover, zeros()), 0.0)
+        held = hover / vehicle.rotor_gain
+        past = Past(rotors_at_hover(vehicle), (), Command(held, zeros()), 0.0)
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
         wrench = Wrench(hover.sum(), zeros())
@@ -91,7 +92,7 @@ class Autopilot:
             "diagnosis": healthy(),
             "on_fault": Decision(reference, healthy()),
             "controller": ControlOutput(wrench),
-            "allocation": account(vehicle, wrench, healthy(), hover / vehicle.rotor_gain),
+            "allocation": account(vehicle, wrench, healthy(), held),
         }
         memories = []
         for slot, part in self.parts.items():

@@ -83,9 +83,10 @@ def load(place: str, what: str) -> object:
         names = [
             key
             for key, value in vars(module).items()
-            if isinstance(value, type) and value.__module__ == module.__name__
+            if (isinstance(value, type) or inspect.isfunction(value)) and value.__module__ == module.__name__
         ]
-        raise InputError(f"{what} '{place}': {source} has no '{name}' (it has: {', '.join(names) or 'no classes'})")
+        there = ", ".join(names) or "no classes or functions"
+        raise InputError(f"{what} '{place}': {source} has no '{name}' (it has: {there})")
     found: object = getattr(module, name)
     return found
 

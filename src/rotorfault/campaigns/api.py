@@ -15,7 +15,7 @@ from rotorfault.base.executors import executor_of
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import differences, replay
 from rotorfault.campaigns.store.store import Store
-from rotorfault.campaigns.study import Study, changed, load_study, study_from
+from rotorfault.campaigns.study import Study, changed, load_study, sources_of, study_from
 from rotorfault.flight.flight import Flight
 
 if TYPE_CHECKING:
@@ -105,10 +105,9 @@ class Campaign:
         if not rows:
             return []
         lines = differences(rows[0], flight.scores)
-        there = self._store.identity.own
-        parts = [] if flight.scenario is None else [part for _, part in flight.scenario.parts()]
-        changed = [part.kind for part in parts if part.source != there.get(part.kind, "")]
-        return [*(f"source of {place} has changed since the campaign was flown" for place in changed), *lines]
+        there, here = self._store.identity.own, {} if flight.scenario is None else sources_of(flight.scenario)
+        other = [place for place, digest in here.items() if digest != there.get(place)]
+        return [*(f"source of {place} has changed since the campaign was flown" for place in other), *lines]
 
 
 def campaign(

@@ -85,7 +85,7 @@ def _metric(table: ScoreTable, name: str) -> NDArray[Any]:
 
 
 def altitudes_lost(table: ScoreTable, height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """By how much in m a flight fell below a height, where it began, after the first true loss; NaN without one."""
+    """How far in m flights fell below a height, where their reference begins, once a fault had begun; else NaN."""
     return np.asarray(np.maximum(height - table["lowest_after_loss"], 0.0))
 
 

@@ -1,6 +1,6 @@
 """Grades: how well a flight of a campaign went, in one word.
 
-The *outcome* of a flight says what happened (`rotorfault.results.metrics`), and whether it *survived* follows from
+The *outcome* of a flight says what happened (`rotorfault.loop.scoring`), and whether it *survived* follows from
 that alone. Its *grade* says how good it was:
 
 ====================  ===============================================================================================

@@ -53,7 +53,7 @@ def differences(row: Mapping[str, Any], scores: Mapping[str, Any]) -> list[str]:
         Of the flight that was flown once more.
     """
     lines = []
-    for name in ("outcome", "survived", *METRICS):
+    for name in ("outcome", "survived", "recovery_time", *METRICS):
         there, here = row.get(name.replace(".", "_")), scores.get(name)
         if not _same(there, here):
             lines.append(f"{name} is {here!r} here and {there!r} in the table")

@@ -1,6 +1,6 @@
 """Studies: which flights a campaign flies, as TOML or from Python, checked once.
 
-Built-in studies are in ``rotorfault/campaigns/studies``. A study names axes (a map has two), quantities that are
+Built-in studies are in ``campaigns/studies``. A study names axes (a map has two), quantities that are
 drawn anew for each flight, and variants that are compared: every variant flies the same draws with the same seeds.
 """
 
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from rotorfault.base import foreign
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.axes import axis
@@ -206,8 +207,7 @@ class Study(Strict):
         tables = self.as_tables()
         if isinstance(self.scenario, str):
             try:
-                scenario = load_scenario(self.scenario, allow_code=self._allow_code)
-                tables["scenario"] = scenario.as_tables()
+                tables["scenario"] = self._scenario_tables()
             except InputError as error:
                 raise InputError(f"study '{self.name}': {error}") from None
         for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
@@ -218,8 +218,23 @@ class Study(Strict):
     @property
     def own_sources(self) -> dict[str, str]:
         """Digest of the source of each part from outside the package, by its place in code."""
-        parts = (part for scenario in self.scenarios for _, part in scenario.parts())
-        return {part.kind: part.source for part in parts if part.source}
+        varied = self._varied_code().items()
+        digests = {place: foreign.source_digest(foreign.load(place, what)) for place, what in varied}
+        for scenario in self.scenarios:
+            digests |= sources_of(scenario)
+        return digests
+
+    def _varied_code(self) -> dict[str, str]:
+        """Places in code among the values of axes and draws, with what they are."""
+        varied = [(part.name, part.grid) for part in self.axis]
+        varied += [(draw.name, list(draw.choice or ())) for draw in self.draw]
+        return {
+            value: name.partition(".")[0]
+            for name, values in varied
+            for value in values
+            # A colon may also stand in the path of a vehicle.
+            if isinstance(value, str) and foreign.is_place(value) and not value.endswith(".toml")
+        }
 
     @property
     def scenario_name(self) -> str:
@@ -233,8 +248,13 @@ class Study(Strict):
         Raises
         ------
         InputError
-            If the scenario cannot be used, or a setting is not allowed.
+            If the scenario cannot be used, a setting is not allowed, or code would run that nobody has allowed.
         """
+        for place, what in self._varied_code().items():
+            try:
+                foreign.require_allowed(place, self._allow_code, what)
+            except InputError as error:
+                raise InputError(f"study '{self.name}': {error}") from None
         return tuple(self._scenario_of(variant) for variant in self.variant)
 
     def _scenario_of(self, variant: Variant) -> Scenario:
@@ -250,15 +270,34 @@ class Study(Strict):
             raise InputError(f"{where}: {error}") from None
 
     def _scenario(self, settings: dict[str, Any]) -> Scenario:
-        if isinstance(self.scenario, str):
-            return load_scenario(self.scenario, settings, allow_code=self._allow_code)
-        tables = copy.deepcopy(self.scenario)
+        tables = self._scenario_tables() if isinstance(self.scenario, str) else copy.deepcopy(self.scenario)
+        # Not as overrides of the scenario, which may name code, for a user gives them: a study may be a stranger's.
         override_all(tables, settings)
         return scenario_from(tables, str(tables.get("name", "scenario")), self._allow_code)
+
+    def _scenario_tables(self) -> dict[str, Any]:
+        """The scenario that it names."""
+        return load_scenario(str(self.scenario), allow_code=self._allow_code).as_tables()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Goes to other processes as plain data: scenarios hold registered parts, which cannot be pickled.
         return study_from, (self.as_tables(), self.name, self._allow_code)
+
+
+def sources_of(scenario: Scenario) -> dict[str, str]:
+    """Digest of the source of all code from outside the package that a scenario runs, by its place.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+    digests = {}
+    for _, part in scenario.parts():
+        if part.source:
+            digests[part.kind] = part.source
+        for place in part.settings.code():
+            digests[place] = foreign.source_digest(foreign.load(place, part.slot.registry.sort))
+    return digests
 
 
 def _require_axis(name: str) -> None:

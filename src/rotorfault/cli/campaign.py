@@ -56,7 +56,7 @@ def campaign(
             raise InputError("--report-only needs the folder of a campaign; give it with --out")
         if study is not None or resume or repair or not report:
             raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
-        _report(Campaign(out))
+        _report(Campaign(out, allow_code=allow_code))
         return
     if study is None:
         raise InputError(

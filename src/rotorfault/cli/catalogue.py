@@ -116,6 +116,6 @@ def check(path: Path, allow_code: bool = False) -> str:
     scenario = load_scenario(path, allow_code=allow_code)
     scenario[REFERENCE].make()
     return (
-        f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on {scenario[PLANT].kind} "
-        f"flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
+        f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on "
+        f"{scenario[PLANT].kind} flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
     )

@@ -118,7 +118,7 @@ def compare(
     Example: rotorfault compare results/a/flight.nc results/b/flight.nc --out results/a-b
     """
     from rotorfault.base.files import output_folder
-    from rotorfault.report import comparison
+    from rotorfault.flight import comparison
 
     if len(flights) < 2:
         raise InputError(f"got {len(flights)} flight file; compare needs at least two")

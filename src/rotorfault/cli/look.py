@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
 from rotorfault.cli.app import AllowCode, app
 
@@ -41,20 +42,31 @@ def check(
         str,
         typer.Argument(help="Vehicle or scenario TOML file, a flight.nc, or FILE.py:NAME for a part of your own."),
     ],
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Setting of a part of your own that has no default."),
+    ] = None,
     allow_code: AllowCode = False,
 ) -> None:
     """Validate a file: one line that says what is wrong and how to mend it, or what it holds.
 
     A part of your own goes through what every part of rotorfault goes through: all engines give the same numbers, no
     number of its settings is baked into its code, it fails where its inputs are no numbers.
+
+    Example: rotorfault check examples/controller.py:PdController
     """
     from rotorfault.cli import catalogue
 
     if is_place(file) and ".py:" in file:
         from rotorfault.flight.check_block import check_block
+        from rotorfault.scenario.overrides import override_all, parse_overrides
 
-        typer.echo(str(check_block(file)))
+        settings: dict[str, object] = {}
+        override_all(settings, parse_overrides(assignments or []))
+        typer.echo(str(check_block(file, settings)))
         return
+    if assignments:
+        raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
     typer.echo(catalogue.check(Path(file), allow_code))
 
 

@@ -45,7 +45,9 @@ def paper(
 
 @app.command()
 def tune(
-    controller: Annotated[str, typer.Argument(help="Registered controller with a search space: roismc, smc, ...")],
+    controller: Annotated[
+        str, typer.Argument(help="roismc, smc, ismc, sdre, or FILE.py:NAME for a class of your own with `search`.")
+    ],
     generations: Annotated[int, typer.Option(min=1, help="Generations of the search.")] = 100,
     population: Annotated[int, typer.Option(min=4, help="Candidates per generation.")] = 24,
     seed: Annotated[int, typer.Option(min=1, help="Seed of the optimiser.")] = 1,

@@ -64,7 +64,7 @@ def no_watch(done: int) -> bool:
 
 def streams_of(batch: Batch) -> dict[str, Stream]:
     """The streams that a batch draws from at every step, by slot, in the order of their rows."""
-    return {slot.name: Stream(part.normals, slot.streams[0]) for slot, part in batch.loop.each() if part.normals}
+    return {slot.name: Stream(part.normals, slot.words(part)[0]) for slot, part in batch.loop.each() if part.normals}
 
 
 def drive_rows(batch: Batch) -> Iterator[tuple[int, Array]]:

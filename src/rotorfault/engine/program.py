@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 from rotorfault.engine.batch import Batch, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
+from rotorfault.engine.structure import skeleton
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
@@ -109,6 +110,49 @@ def trace(batch: Batch) -> Traced:
     moved = loop.substep(state, command, start + tape.term("count", 0) * dt, parameters, dt)
     move = Section(tape, [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(moved))], [])
     return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
+
+
+def same_code(one: Batch, *others: Batch) -> bool:
+    """Whether batches can be flown as one, by the same compiled code.
+
+    Parts from outside the package may use a float of their settings anywhere. Where loops differ in such floats
+    alone, they are traced, once for each set of floats: if the floats are parameters, as they should be, the traces
+    are equal. Nothing is kept for the next time, for a class of the same name may then be another one.
+
+    Parameters
+    ----------
+    one, *others : Batch
+    """
+    words, numbers = skeleton(one.loop)
+    kinds = [type(part) for _, part in one.loop.each()]
+    unlike: dict[tuple[float, ...], Batch] = {}
+    for other in others:
+        other_words, other_numbers = skeleton(other.loop)
+        if other_words != words or any(
+            type(part) is not kind for (_, part), kind in zip(other.loop.each(), kinds, strict=True)
+        ):
+            return False
+        if other_numbers != numbers:
+            unlike[other_numbers] = other
+    if not unlike:
+        return True
+    if any(part.python_only for _, part in one.loop.each()):
+        return False
+    written = _written(one)
+    return all(_written(other) == written for other in unlike.values())
+
+
+def _written(batch: Batch) -> list[Any]:
+    """All that a loop's trace computes, as values that can be compared."""
+    sections = trace(batch).sections
+    return [
+        (
+            [repr(term) for term in section.tape.terms],
+            [(pointer, row, term.index) for pointer, row, term in section.writes],
+            [term.index for term in section.signals],
+        )
+        for section in sections
+    ]
 
 
 def _symbols(tape: Tape, kind: str, record: Any) -> Any:

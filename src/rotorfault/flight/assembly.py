@@ -17,7 +17,7 @@ from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
 from rotorfault.engine.batch import Array, Batch, columns
 from rotorfault.engine.noise import Stream, normals
-from rotorfault.engine.structure import structure
+from rotorfault.engine.program import same_code
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
 from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.geometry import Vec3
@@ -114,8 +114,9 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
         raise InputError("no scenarios were given; a batch needs at least one")
     batches = [assemble(scenario) for scenario in scenarios]
     first = batches[0]
+    alike = same_code(*batches)
     for batch, scenario in zip(batches[1:], scenarios[1:], strict=True):
-        same = structure(batch.loop) == structure(first.loop) and batch.every == first.every
+        same = (alike or same_code(first, batch)) and batch.every == first.every
         if not same or not np.array_equal(batch.reference, first.reference):
             raise InputError(
                 f"scenario '{scenario.name}' differs from the first in more than numbers (parts, options, length or "
@@ -200,16 +201,24 @@ def start_of(scenario: Scenario) -> Start:
     return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
 
 
-def first_normals(loop: ClosedLoop, seeds: tuple[tuple[int, int], ...]) -> Any:
-    """Standard normal numbers for `initial` of the parts that need some, by slot, each of shape (N,)."""
-    streams: dict[str, Stream] = {}
+def first_normals(loop: ClosedLoop, seeds: tuple[tuple[int, int], ...]) -> tuple[Any, Any]:
+    """Standard normal numbers for `initial` and for the first step, by slot, each of shape (N,).
+
+    A part that says nothing of the start gets the numbers of the first step there too.
+    """
+    steps: dict[str, Stream] = {}
+    starts: dict[str, Stream] = {}
     for slot, part in loop.each():
+        if part.normals:
+            steps[slot.name] = starts[slot.name] = Stream(part.normals, slot.words(part)[0])
         if part.first_normals is not None:
-            streams[slot.name] = Stream(part.first_normals, slot.streams[1])
-        elif part.normals:
-            streams[slot.name] = Stream(part.normals, slot.streams[0])
-    record = record_type("FirstNormals", tuple(streams))
-    return record(*(tuple(normals(seeds, stream, 0, 1)[0]) for stream in streams.values()))
+            starts[slot.name] = Stream(part.first_normals, slot.words(part)[1])
+
+    def drawn(name: str, streams: dict[str, Stream]) -> Any:
+        numbers = (tuple(normals(seeds, stream, 0, 1)[0]) if stream.width else () for stream in streams.values())
+        return record_type(name, tuple(streams))(*numbers)
+
+    return drawn("FirstNormals", starts), drawn("Normals", steps)
 
 
 def initial_state(
@@ -218,10 +227,11 @@ def initial_state(
     """State before the first step, for one flight or, with leaves of N numbers, for N."""
     drive = loop.drive()
     wanted, own = unflatten((drive.reference, drive.own), reference[0].tolist())
-    drive = drive._replace(reference=wanted, own=own)
+    at_start, first_step = first_normals(loop, seeds)
+    drive = drive._replace(reference=wanted, own=own, normals=first_step)
     # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
     # must begin the same alone and in any batch.
-    many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=first_normals(loop, seeds))
+    many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=at_start)
     state = loop.initial(many, drive, parameters)
     return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
 

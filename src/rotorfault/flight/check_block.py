@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
-from rotorfault.base.foreign import in_one_line, is_place
+from rotorfault.base.foreign import in_one_line, is_place, load
 from rotorfault.base.text_table import table_lines
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, no_watch
@@ -25,8 +25,9 @@ from rotorfault.flight.assembly import assemble
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.model.block import Block
-from rotorfault.model.slot import slot_of
+from rotorfault.model.slot import Slot, slot_of
 from rotorfault.model.telemetry import signals_of
+from rotorfault.plant.faults import FAULT
 from rotorfault.scenario.part import Part, part_from
 from rotorfault.scenario.scenario import Scenario, scenario_from
 from rotorfault.scenario.slots import SLOTS
@@ -111,23 +112,25 @@ def _part(part: str | type[AnyBlock] | AnyBlock | Part[Any], settings: dict[str,
     if isinstance(part, str):
         if not is_place(part):
             raise InputError(f"part: got '{part}'; allowed: a class, an object, or a place such as FILE.py:NAME")
-        for slot in SLOTS:
-            try:
-                return part_from(slot, {"kind": part, **settings}, allow=True)
-            except InputError as error:
-                if " is a " not in str(error):
-                    raise
-        raise InputError(f"part: '{part}' is of no kind that has a slot")
+        thing = load(part, "part")
+        adapting = (slot for slot in SLOTS if slot.adapt is not None and slot.adapt(thing) is not None)
+        slot = next(adapting, None) or slot_of(thing)
+        return part_from(slot, {"kind": part, **_some(slot, settings)}, allow=True)
     slot = slot_of(part)
     if isinstance(part, Block):
         return Part(slot, type(part).__name__, part.settings, factory=lambda _: part)  # type: ignore[arg-type]
     try:
-        return Part(slot, part.__name__, part.Settings.model_validate(settings), factory=part)
+        return Part(slot, part.__name__, part.Settings.model_validate(_some(slot, settings)), factory=part)
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError(
             f"{part.__name__}.Settings needs {'.'.join(map(str, first['loc']))}; give it by settings={{...}}"
         ) from None
+
+
+def _some(slot: Slot[Any], settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a part; a fault hits rotor 1 if nobody says which."""
+    return {"rotor": 1, **settings} if slot is FAULT else settings
 
 
 def _checks(part: Part[Any]) -> Iterator[Check]:

@@ -85,8 +85,6 @@ class Flight:
         names = ("scenario", "controller", "preset", "plant", "engine")
         about = {name: str(attributes.get(name, "")) for name in names}
         numbers = finite_or_none(nested(self.scores))
-        # An interrupted flight has no outcome in its scores.
-        numbers |= {"outcome": self.outcome.kind, "survived": self.outcome.survived, "end_time": self.outcome.time}
         return Summary(**about, seed=int(attributes["seed"]), version=str(attributes["version"]), **numbers)
 
     def plot(self) -> dict[str, Figure]:

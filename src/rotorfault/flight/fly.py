@@ -30,7 +30,9 @@ from rotorfault.results.outcome import Outcome, finite_or_none
 from rotorfault.results.score_table import score_table
 from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.part import NO_PRESET
 from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
+from rotorfault.scenario.slots import SLOTS
 
 
 def fly(
@@ -150,7 +152,7 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
     InputError
         If the file cannot be read, names code that is not allowed, or was flown by a controller that is not in it.
     """
-    from rotorfault.results.dataset import read_configuration
+    from rotorfault.results.dataset import OLD_FORMAT, read_configuration
 
     tables, attributes = read_configuration(path)
     if attributes.get("own_controller"):
@@ -158,8 +160,18 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
             f"{path}: was flown by your own controller '{attributes['own_controller']}', which a file cannot hold; "
             "fly it with rotorfault.fly(scenario, controller=...)"
         )
+    if attributes["format"] == OLD_FORMAT:
+        _without_presets(tables)
     scenario = scenario_from(tables, str(path), allow_code)
     return fly(scenario, engine=engine or str(attributes["engine"]))
+
+
+def _without_presets(tables: dict[str, Any]) -> None:
+    """Say of a scenario's complete tables that they come from no preset that is known: older files name none."""
+    for slot in SLOTS:
+        part = tables.get(slot.name)
+        if slot.presets is not None and isinstance(part, dict) and slot.presets(part["kind"]):
+            part.setdefault("preset", NO_PRESET)
 
 
 def _run(batch: Batch, engine: str, period: float) -> Recording:
@@ -183,8 +195,6 @@ def _flight(scenario: Scenario, recording: Recording, batch: Batch, index: int, 
         # The record of the end itself (the first from it on) is kept where it has numbers, and the first in any case.
         end = min(int(np.searchsorted(recording.steps, over.end)) + 1, len(times))
         end = max(1, end - (1 if not np.isfinite(signals[end - 1]).all() else 0))
-    elif recording.interrupted:
-        outcome = Outcome("interrupted", float(times[-1]))
     attributes = _attributes(scenario, engine, own) | {
         "outcome": outcome.kind,
         "end_time": outcome.time,

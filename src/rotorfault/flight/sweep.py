@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_own
-from rotorfault.flight.assembly import Group, overridden
+from rotorfault.engine.program import same_code
+from rotorfault.flight.assembly import Group, assemble, overridden
 from rotorfault.scenario.overrides import override
 from rotorfault.scenario.part import Part
 from rotorfault.scenario.scenario import Scenario
@@ -105,22 +106,24 @@ def _is_numeric(scenario: Scenario, tables: dict[str, Any], key: str, column: ND
     """Whether a key of the scenario holds a float that may be one of the batch's numbers.
 
     Of parts from outside the package nobody knows whether they keep the rule that every float is a parameter
-    (`rotorfault.check_block` tells): there, a float is part of the loop.
+    (`rotorfault.check_block` tells): there, loops with the least and the largest value must have the same code.
     """
     first, _, rest = key.partition(".")
-    if not np.issubdtype(column.dtype, np.number):
+    if not np.issubdtype(column.dtype, np.number) or not isinstance(_value_at(tables, key), float):
         return False
-    if first in SLOTS:
-        slot = SLOTS[first]
-        if slot.side == "task":
-            return False
-        value = getattr(scenario, first)
-        part = value[int(rest.partition(".")[0])] if slot.many else value
-        if not isinstance(part, Part) or not is_own(type(part.make()).__module__):
-            return False
-    elif first not in _TABLES:
+    if first not in SLOTS:
+        return first in _TABLES
+    slot = SLOTS[first]
+    if slot.side == "task":
         return False
-    return isinstance(_value_at(tables, key), float)
+    value = getattr(scenario, first)
+    part = value[int(rest.partition(".")[0])] if slot.many else value
+    if not isinstance(part, Part):
+        return False
+    if is_own(type(part.make()).__module__):
+        return True
+    ends = (overridden(scenario, {key: float(end)}, "vary") for end in (column.min(), column.max()))
+    return same_code(*(assemble(one) for one in ends))
 
 
 def _value_at(tables: dict[str, Any], key: str) -> Any:

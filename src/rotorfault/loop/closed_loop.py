@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, cast, final
 
 from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
-from rotorfault.autopilot.response.land import Land
+from rotorfault.autopilot.response.protocol import ON_FAULT
 from rotorfault.loop.recorded import Recorder
 from rotorfault.loop.scores import Scores, ScoringParameters, unjudged
 from rotorfault.loop.scoring import Scoring
@@ -117,7 +117,8 @@ class ClosedLoop:
                 telemetry |= {f"{slot.name}_{number}": one.Telemetry for number, one in enumerate(part)}
             else:
                 telemetry[slot.name] = part.Telemetry
-        lands = any(isinstance(part, Land) for part in self.parts.values())
+        response = self.maybe(ON_FAULT)
+        lands = response is not None and response.lands
         self.recorder = Recorder(self.plant.ground is not None, lands, telemetry)
         self.layout = self.recorder.layout
         self.scoring = Scoring(
@@ -210,9 +211,10 @@ class ClosedLoop:
         )
         air = self.plant.wind.at(0.0, held.wind, numbers.wind)
         truth = self.plant.observe(plant, held, air, 0.0, plant_numbers)
-        inputs = _sensed(truth, 0.0, _normals(start.normals, "sensors"))
-        sensors = self.sensors.initial(inputs, numbers.sensors)
-        readings = self.sensors.step(sensors, inputs, numbers.sensors, parameters.period)[1]
+        sensors = self.sensors.initial(_sensed(truth, 0.0, _normals(start.normals, "sensors")), numbers.sensors)
+        # Read as at the first step, which reads them once more.
+        sensed = _sensed(truth, 0.0, _normals(drive.normals, "sensors"))
+        readings = self.sensors.step(sensors, sensed, numbers.sensors, parameters.period)[1]
         autopilot = self.autopilot.initial(readings, drive.reference, parameters.belief, numbers, parameters.period)
         return LoopState(plant, self._kept(held, sensors), autopilot, self.scoring.initial(), 0.0)
 

@@ -40,7 +40,7 @@ def cost_rate(signals: Any, error: Vec3, turn: Vec3) -> Scalar:
     share = each(
         lambda e, most: select(less_equal(absolute(e), ERROR_FLOOR), e * e * (1.0 / ERROR_FLOOR), most), error, size
     )
-    push = size.times(signals.controller.virtual_position)
+    push = size.times(signals.parts.controller.virtual_position)
     rates = signals.body_rates
     state = turn.dot(turn) + rates.dot(rates) + Q_POSITION * share.sum() + Q_VELOCITY * slope.dot(slope)
     return state + R_TORQUE * torque.dot(torque) + push.dot(Vec3.of(R_POSITION).times(push))

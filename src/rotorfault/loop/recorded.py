@@ -96,7 +96,9 @@ class Recorder:
         common += [GroundSignals] if ground else []
         common += [LandingSignals] if lands else []
         signals = [signal for kind in common for signal in signals_of(kind)]
-        fields = [*(signal.name for signal in signals), *self._parts]
+        # A record of their own: a slot may have the name of one of the loop's signals, as the wind has.
+        self._own = record_type("PartSignals", tuple(self._parts))
+        fields = [*(signal.name for signal in signals), "parts"]
         for name, kind in self._parts.items():
             signals += signals_of(kind, name)
         self.layout = Layout(tuple(signals))
@@ -152,4 +154,4 @@ class Recorder:
         )
         more = [truth.ground_force] if self._ground else []
         more += [decision.stage] if self._lands else []
-        return self._record(*own, *more, *(telemetry[name] for name in self._parts))
+        return self._record(*own, *more, self._own(*(telemetry[name] for name in self._parts)))

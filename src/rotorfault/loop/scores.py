@@ -24,8 +24,8 @@ SLIDE_MAX = 0.5  # m/s, horizontal
 TILT_MAX = math.radians(15.0)  # at touch-down; beyond it a vehicle of usual proportions tips over its feet
 REST = 0.5  # s that a landed vehicle must stand with rotors stopped; then the flight is over
 AT_LIMIT = 1e-9  # of the largest command: below it a difference from a limit is rounding
-# m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that has
-# recovered is not on the verge of being degraded.
+# m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that
+# has recovered is not on the verge of being degraded.
 RECOVERED = 0.25
 READ_AFTER = 0.15  # s after an onset at which losses are read: six time constants of the believed loss
 COST_INPUT = "controller.virtual_position"
@@ -35,6 +35,9 @@ ENDS = ("flying", "diverged", "tumbled", "ground", "landed")
 
 SURVIVED = ("settled", "tracked", "offset", "landed")
 """Outcomes with which the vehicle is sound."""
+
+INTERRUPTED = "interrupted"
+"""Outcome of a flight that somebody ended before it was over."""
 
 
 class ScoringParameters(NamedTuple):

@@ -9,7 +9,7 @@ and a flight has one set of numbers whatever of it is recorded and how finely.
   (touched it more gently than that, and stood there with rotors stopped for 0.5 s). A flight that lasts to its end is
   ``settled`` (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square
   error over the last half within 5 % of the reference's span on every axis) or ``offset`` (neither). It has
-  *survived* unless it diverged, tumbled or crashed.
+  *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is ``interrupted``.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
 - *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.
@@ -265,7 +265,10 @@ class Scoring:
                 for detection, rotor in zip(scores.detections, self.rotors, strict=True)
             ),
             signals=self._counts(
-                *(self._signal(signal, old, signals, first) for signal, old in zip(self.counted, scores.signals, strict=True))
+                *(
+                    self._signal(signal, old, signals, first)
+                    for signal, old in zip(self.counted, scores.signals, strict=True)
+                )
             ),
         )  # fmt: skip
 
@@ -294,7 +297,7 @@ class Scoring:
     @staticmethod
     def _signal(signal: Signal, old: Scalar, signals: Any, first: Scalar) -> Scalar:
         """What is counted of one signal after this instant."""
-        value = signals
+        value = signals.parts if "." in signal.name else signals
         for name in signal.name.split("."):
             value = getattr(value, name)
         leaves = flatten(value)

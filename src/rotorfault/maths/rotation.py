@@ -115,7 +115,7 @@ class Quat(Value):
 
     @classmethod
     def small(cls, rotation: Vec3) -> Quat:
-        """The rotation by a small rotation vector in rad; of unit length, its angle short by a twelfth of the cube."""
+        """The rotation by a small rotation vector in rad; of unit length; its angle lacks a twelfth of the cube."""
         half = rotation * 0.5
         scale = 1.0 / sqrt(1.0 + half.dot(half))
         return cls(scale, half.x * scale, half.y * scale, half.z * scale)

@@ -9,14 +9,11 @@ out (`rotorfault.model.slot`).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar, cast
 
 from rotorfault.base.config import Strict
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from rotorfault.model.slot import Slot
 
 InputsT = TypeVar("InputsT")
 OutputT = TypeVar("OutputT")
@@ -24,7 +21,7 @@ MemoryT = TypeVar("MemoryT")
 ParametersT = TypeVar("ParametersT")
 
 Record: TypeAlias = tuple[Any, ...]
-"""A NamedTuple of scalars, value types and records; its leaves are of whatever number type an engine computes with."""
+"""A NamedTuple of scalars, value types and records; its leaves are of the number type of an engine."""
 
 
 class Context(NamedTuple):
@@ -64,7 +61,7 @@ class Block(Generic[InputsT, OutputT, MemoryT, ParametersT]):
     normals: ClassVar[int] = 0
     first_normals: ClassVar[int | None] = None
     python_only: ClassVar[bool] = False
-    slot: ClassVar[Slot[Any] | None] = None  # of the kind; set where the kind is defined
+    slot: ClassVar[object] = None  # the `Slot` of the kind, set where the kind is defined
 
     def __init__(self, settings: Any = None) -> None:
         # Of the part's own class of settings, which a type parameter more would name at every use.

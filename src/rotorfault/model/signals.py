@@ -1,7 +1,7 @@
 """What flows between the parts of the closed loop: records with named fields, SI units and radians.
 
-Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Attitude flows as a unit quaternion ``q_WB``
-(body to world); angles are for people. Thrusts are in newton per rotor.
+Suffixes name frames: ``_W`` world (x forward, y left, z up), ``_B`` body. Attitude flows as a unit quaternion
+``q_WB`` (body to world); angles are for people. Thrusts are in newton per rotor.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def healthy() -> Diagnosis:
     return Diagnosis(loss=none, flagged=none, estimate=none, residual=none)
 
 
-def at_rest() -> Estimate:
-    """At the origin, level and still; a hovering vehicle feels its weight."""
+def at_rest(gravity: Scalar) -> Estimate:
+    """At the origin, level and still; a hovering vehicle feels its weight, by a gravity in m/s^2."""
     zero = zeros()
-    return Estimate(zero, zero, Quat.identity(), zero)
+    return Estimate(zero, zero, Quat.identity(), zero, Vec3(0.0, 0.0, gravity))

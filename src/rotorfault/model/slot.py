@@ -43,8 +43,9 @@ class Slot(Generic[B]):
         Whether a scenario has any number of such parts, in a list.
     optional : bool
         Whether a scenario may have none.
-    streams : (int, int)
-        Words that tell the random numbers of a flight's steps, and of its start, from those of other slots.
+    streams : (int, int), optional
+        Words that tell the random numbers of a flight's steps, and of its start, from those of other slots. A slot
+        without them has no part that draws.
     shorthand : callable, optional
         Turns what may stand for a table in a scenario (a bare number, say) into the table; leaves the rest alone.
     calm : str, optional
@@ -69,7 +70,7 @@ class Slot(Generic[B]):
         default: str | None = None,
         many: bool = False,
         optional: bool = False,
-        streams: tuple[int, int] = (0, 0),
+        streams: tuple[int, int] | None = None,
         calm: str | None = None,
         shorthand: Callable[[Any], Any] | None = None,
         presets: Callable[[str], Mapping[str, Mapping[str, Any]]] | None = None,
@@ -92,6 +93,26 @@ class Slot(Generic[B]):
         self.registry: Final[Registry[B]] = Registry(sort or name, name, self.kind_of)
         base.slot = self  # type: ignore[attr-defined]
 
+    def words(self, part: object) -> tuple[int, int]:
+        """The words of its streams of random numbers.
+
+        Parameters
+        ----------
+        part : object
+            That draws from them, for the message.
+
+        Raises
+        ------
+        InputError
+            If it has none: numbers of another slot's stream must not serve.
+        """
+        if self.streams is None:
+            raise InputError(
+                f"{self.registry.sort} {type(part).__name__} asks for random numbers (normals); parts of the slot "
+                f"'{self.name}' get none"
+            )
+        return self.streams
+
     def kind_of(self, part: object, where: str) -> Kind[B]:
         """What code from outside the package gives, as a kind of part of this slot.
 
@@ -109,11 +130,13 @@ class Slot(Generic[B]):
         """
         if self.adapt is not None and (adapted := self.adapt(part)) is not None:
             return adapted
-        home = slot_of(part)
+        try:
+            home = slot_of(part)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
         if home is not self or not callable(part):
-            raise InputError(
-                f"{where} is a {home.registry.sort}; allowed: a class that derives from rotorfault.{self.base.__name__}"
-            )
+            allowed = f"a class that derives from rotorfault.{self.base.__name__}"
+            raise InputError(f"{where} is a {home.registry.sort}; allowed: {allowed}")
         return cast("Kind[B]", part)
 
     def __repr__(self) -> str:
@@ -156,7 +179,7 @@ def slot_of(part: object) -> Slot[Any]:
     """
     slot = getattr(part, "slot", None)
     if not isinstance(slot, Slot):
-        name = part.__name__ if isinstance(part, type) else type(part).__name__
+        name = getattr(part, "__name__", type(part).__name__)
         raise InputError(
             f"{name} derives from no kind of part; derive it from rotorfault.Controller, Wind, Fault, Estimator ..."
         )

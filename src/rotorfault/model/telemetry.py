@@ -80,8 +80,8 @@ def signals_of(telemetry: type[tuple[Any, ...]], prefix: str = "") -> tuple[Sign
         if quantity is None or kind not in KINDS:
             allowed = ", ".join(getattr(one, "__name__", "Scalar") for one in KINDS if one is not Scalar)
             raise InputError(
-                f"telemetry {telemetry.__name__}.{name}: allowed: Annotated[KIND, Quantity(unit, frame, meaning)] with "
-                f"KIND one of Scalar, {allowed}"
+                f"telemetry {telemetry.__name__}.{name}: allowed: Annotated[KIND, Quantity(unit, frame, meaning)] "
+                f"with KIND one of Scalar, {allowed}"
             )
         signals.append(Signal(f"{prefix}.{name}" if prefix else name, kind, quantity))
     return tuple(signals)
@@ -134,10 +134,11 @@ class Layout:
             return list(range(place.start, place.stop))
         if name in self.rows:
             return [self.rows.index(name)]
-        ends = [row for row, full in enumerate(self.rows) if full.partition(".")[2] == name]
-        return ends or [
-            row
-            for signal in self.signals
-            if signal.name.partition(".")[2] == name
-            for row in range(self._starts[signal.name].start, self._starts[signal.name].stop)
-        ]
+        rows = []
+        for signal in self.signals:
+            slot, _, short = signal.name.rpartition(".")
+            place = self._starts[signal.name]
+            for row in range(place.start, place.stop) if slot else ():
+                if name == short or self.rows[row] == f"{slot}.{name}":
+                    rows.append(row)
+        return rows

@@ -10,7 +10,7 @@
     y = { value = 0.0, unit = "m", source = "..." }            # left of it
     yaw = "+"                    # its drag torque turns the body towards positive yaw (to the left)
 
-Units are the SI units of `rotorfault.model.vehicle.Vehicle` and nothing else, so that no number is converted silently.
+Units are the SI units of `rotorfault.model.vehicle.Vehicle` alone, so that no number is converted silently.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ rho_z as lever of friction is a simplification with the same end. Rotor tips and
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, final
 
 from pydantic import Field
@@ -31,7 +32,7 @@ from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT
 from rotorfault.model.signals import State
 from rotorfault.model.slot import Slot, register
 
-LARGEST_STEP = 0.005  # s: integration step up to which contact with the default gear is stable with room to spare
+LARGEST_STEP = 0.005  # s: see `Ground.longest_step`; for the default gear
 
 
 class Contact(NamedTuple):
@@ -59,6 +60,10 @@ class Ground(Block[State, Contact, MemoryT, ParametersT]):
     def height(self, parameters: ParametersT) -> Scalar:
         """Height in m of the centre of mass when the vehicle stands on it; below it a flight is lost."""
         raise NotImplementedError(f"{type(self).__name__} has no height")
+
+    def longest_step(self) -> float:
+        """Integration step in s up to which contact is stable with room to spare."""
+        return LARGEST_STEP
 
 
 def _level(value: Any) -> Any:
@@ -134,6 +139,17 @@ class Level(Ground[Nothing, GroundParameters]):
     def height(self, parameters: GroundParameters) -> Scalar:
         """The same everywhere."""
         return parameters.height
+
+    def longest_step(self) -> float:
+        """Shorter than for the default gear as the fastest of springs, dampers and friction is faster than there."""
+        s, default = self.settings, self.Settings()
+        # A tilted vehicle turns on its feet: springs that sink less are faster by the root of it, and by the spread;
+        # dampers act by the force of the springs, and by the lever of the feet twice.
+        hard = math.sqrt(default.sag / s.sag)
+        wide = max(s.foot_spread, 1.0) / default.foot_spread
+        dampers = s.damping / default.damping * hard * wide**2
+        friction = s.friction / default.friction * default.slip_speed / s.slip_speed
+        return LARGEST_STEP / float(max(1.0, hard * wide, dampers, friction))
 
     def contact(self, state: State, parameters: GroundParameters) -> Contact:
         """Springs, dampers and friction of four feet."""

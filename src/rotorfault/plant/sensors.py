@@ -33,7 +33,9 @@ class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
     """A set of sensors: `step` turns the truth of a sampling instant into readings."""
 
 
-SENSORS = Slot("sensors", Sensors, "truth", "what the autopilot can measure", "sensors", default="ideal")
+SENSORS = Slot(
+    "sensors", Sensors, "truth", "what the autopilot can measure", "sensors", default="ideal", streams=(0, 3)
+)
 
 
 @final

@@ -290,8 +290,8 @@ class Function(ReferenceSource):
         """Which function."""
 
         function: Callable[[float], Any] | str = Field(
-            description="The function, or where it is: 'package.module:name'. It takes the time [s] and returns "
-            "x, y, z [m] and yaw [rad], or a Reference with all derivatives"
+            description="The function, or where it is: 'FILE.py:name' or 'package.module:name'. It takes the time "
+            "[s] and returns x, y, z [m] and yaw [rad], or a Reference with all derivatives"
         )
 
         def code(self) -> tuple[str, ...]:
@@ -351,7 +351,7 @@ class Function(ReferenceSource):
 
 
 def _import(place: str) -> Callable[[float], Sequence[float] | Reference]:
-    """Load a function from ``package.module:name``."""
+    """Load a function from its place."""
     function = foreign.load(place, "reference function")
     if not callable(function):
         raise InputError(f"reference function '{place}': it is no function; check the name")

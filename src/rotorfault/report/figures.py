@@ -51,7 +51,7 @@ def draw(data: xr.Dataset | Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     Parameters
     ----------
     data : Dataset or mapping of str to Dataset
-        Flights as `rotorfault.results.dataset.dataset` makes them; the keys of a mapping stand in the legends.
+        `Flight.data` of one flight or several; the keys of a mapping stand in the legends.
 
     Returns
     -------

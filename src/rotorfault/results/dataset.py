@@ -56,8 +56,8 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
         raise InputError(
-            f"{path}: was written by version {data.attrs.get('version', '0.1')} and holds other signals than this one "
-            "reads; 'rotorfault fly --repeat' flies it again"
+            f"{path}: was written by version {data.attrs.get('version', '0.1')} and holds other signals than this "
+            "version reads; 'rotorfault fly --repeat' flies it again"
         )
     if form != FORMAT:
         raise InputError(f"{path}: attribute 'format' is {form!r}; allowed: '{FORMAT}'")

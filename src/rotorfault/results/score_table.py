@@ -5,8 +5,10 @@ flight, detections of rotors that no fault hits, landings that were not begun. C
 angle or rotor:
 
 - ``outcome``, ``survived``, ``end_time`` [s];
-- ``settle_time`` and ``recovery_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m], ``velocity_end`` [m/s], by axis;
-- ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``, ``tilt_end``
+- ``settle_time`` and ``recovery_time`` [s], ``position_mse`` [m^2], ``position_error_end`` [m],
+  ``velocity_end`` [m/s], by axis;
+- ``attitude_mse`` [rad^2] by axis of rotation, ``attitude_end`` [rad] as angles for people, ``tilt_max``,
+  ``tilt_end``
   [rad];
 - ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
   flights that lasted); ``cost``;
@@ -27,7 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Array, Batch, columns
-from rotorfault.loop.scores import ENDS, FAR, SURVIVED, Scores, ScoringParameters
+from rotorfault.loop.closed_loop import LoopState
+from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, Scores, ScoringParameters
 from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.records import unflatten
 from rotorfault.model.telemetry import Signal
@@ -88,7 +91,7 @@ class ScoreTable:
 
 
 def score_table(batch: Batch, state: Array) -> ScoreTable:
-    """The table of a batch that was flown to its end.
+    """The table of a batch that was flown to its end, or until it was interrupted.
 
     Parameters
     ----------
@@ -96,14 +99,17 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
     state : ndarray, shape (leaves of `LoopState`, N)
         At the end, as a `Recording` has it.
     """
-    scores: Scores = unflatten(batch.state, list(state)).scores
+    flown: LoopState = unflatten(batch.state, list(state))
+    scores = flown.scores
     numbers = unflatten(batch.parameters, list(columns(batch.parameters, batch.flights)))
     parameters: ScoringParameters = numbers.scoring
     scoring, dt = batch.loop.scoring, np.asarray(numbers.period, dtype=float)
     onsets = batch.loop.onsets(numbers.parts)
-    outcome = _outcomes(batch, scores, parameters)
+    lasted = (scores.over == 0.0) & (flown.steps >= batch.steps)
+    outcome = np.where((scores.over > 0.0) | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
     survived = np.isin(outcome, SURVIVED)
-    end_time = np.where(scores.over > 0.0, scores.end, batch.steps) * dt
+    end: Array = np.asarray(scores.end, dtype=float)
+    end_time: Array = np.where(scores.over > 0.0, end, flown.steps) * dt
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 / np.where(scores.seen > 0.0, scores.seen, np.nan)
         table: Columns = {"outcome": outcome, "survived": survived, "end_time": end_time}
@@ -117,7 +123,6 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table["tilt_end"] = np.arccos(np.clip(scores.attitude.z_axis().z, -1.0, 1.0))
         table |= _named("velocity_end", AXES, scores.velocity)
         late = np.maximum(batch.steps - parameters.half, 1.0)
-        lasted = scores.over == 0.0
         table["late_position_rms"] = np.where(lasted, np.sqrt(scores.late_square.sum() / late), np.nan)
         table["late_yaw_rms"] = np.where(lasted, np.sqrt(scores.late_yaw_square / late), np.nan)
         cost = 0.5 * dt * (scores.cost - 0.5 * (scores.cost_first + scores.cost_last))

@@ -62,6 +62,8 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
         tables["vehicle"] = str(folder / vehicle)
     if isinstance(reference, dict) and isinstance(reference.get("file"), str):
         reference["file"] = str(folder / reference["file"])
+    if isinstance(reference, dict) and is_file(reference.get("function")):
+        reference["function"] = str(folder / reference["function"])
     for slot in SLOTS:
         part = tables.get(slot.name)
         for table in part if isinstance(part, list) else [part]:
@@ -72,7 +74,7 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
 
 
 def is_file(kind: object) -> bool:
-    """Whether a part is named by a place in a file, ``FILE.py:NAME``."""
+    """Whether a part or a function is named by a place in a file, ``FILE.py:NAME``."""
     return isinstance(kind, str) and is_place(kind) and kind.rpartition(":")[0].endswith(".py")
 
 

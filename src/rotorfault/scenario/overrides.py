@@ -8,14 +8,16 @@ from typing import Any
 
 from rotorfault.base.errors import InputError
 from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.scenario.part import change_preset
+from rotorfault.scenario.slots import SLOTS
 
 
 def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Set several dotted keys in tables, in place: whole tables and kinds first, for they drop what was in them."""
+    """Set several dotted keys in tables, in place: tables, kinds and presets first, for they drop what was there."""
 
     def outermost_first(key: str) -> tuple[int, bool]:
         *path, last = key.split(".")
-        return (len(path), False) if last == "kind" else (len(path) + 1, True)
+        return (len(path), False) if last == "kind" else (len(path) + 1, last != "preset")
 
     for key in sorted(changes, key=outermost_first):
         override(tables, key, changes[key])
@@ -26,7 +28,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
     Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
     below it is set (``vehicle.rotor_bandwidth.value``). Setting ``kind``, or a table that has one to a bare name,
-    drops the other settings of that table: they belonged to another kind.
+    drops the other settings of that table: they belonged to another kind. Setting ``preset`` drops those that the
+    former preset gave (`rotorfault.scenario.part.change_preset`).
 
     Raises
     ------
@@ -56,6 +59,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
     elif last == "kind" and here.get("kind") != value:
         here.clear()
         here["kind"] = value
+    elif last == "preset" and path and path[0] in SLOTS:
+        change_preset(SLOTS[path[0]], here, value)
     else:
         if key == "reference.file":
             # The text that a checked scenario holds is that of the former file.

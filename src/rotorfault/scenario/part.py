@@ -75,10 +75,12 @@ class Part(Generic[B]):
 
     @property
     def source(self) -> str:
-        """Digest of the source, for a part from outside the package; empty for one of the package's own."""
+        """Digest of the source, for a part from outside the package or one that runs code from there; else empty."""
         factory = self.factory
         home = getattr(factory, "__module__", type(factory).__module__)
-        return "" if foreign.is_own(home) else foreign.source_digest(getattr(factory, "kind", factory))
+        own = [] if foreign.is_own(home) else [getattr(factory, "kind", factory)]
+        own += [foreign.load(place, self.slot.registry.sort) for place in self.settings.code()]
+        return "".join(foreign.source_digest(thing) for thing in own)
 
 
 def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
@@ -127,6 +129,47 @@ def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Pa
         raise passed_on(error) from None
     except InputError as error:
         raise refusal("", str(error)) from None
+
+
+def change_preset(slot: Slot[Any], table: dict[str, Any], preset: str) -> None:
+    """Put another preset into the table of a part, in place.
+
+    A table with all settings, as `Part.as_table` gives it, loses those that came from the preset before; what stands
+    beside a preset in a table otherwise stays.
+
+    Parameters
+    ----------
+    slot : Slot
+    table : dict
+    preset : str
+        Name of the new one.
+    """
+    former, kind = table.get("preset"), str(table.get("kind", slot.default))
+    table["preset"] = preset
+    if former in (None, preset) or slot.presets is None or kind not in slot.registry:
+        return
+    try:
+        settings = slot.registry[kind].Settings.model_validate(slot.presets(kind).get(former, {}))
+    except ValidationError:
+        return  # of one that gives not all that is needed no table is full by itself
+    before = settings.model_dump(mode="json")
+    if set(table) >= set(before):
+        kept = _unlike({key: value for key, value in table.items() if key not in ("kind", "preset")}, before)
+        table.clear()
+        table.update({"kind": kind, **kept, "preset": preset})
+
+
+def _unlike(table: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a table differs from another."""
+    kept = {}
+    for key, value in table.items():
+        old = before.get(key)
+        if isinstance(value, Mapping) and isinstance(old, Mapping):
+            if inner := _unlike(value, old):
+                kept[key] = inner
+        elif key not in before or value != old:
+            kept[key] = value
+    return kept
 
 
 def part_from(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:

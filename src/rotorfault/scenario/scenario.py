@@ -1,7 +1,7 @@
 """Scenarios: everything that defines a flight, as TOML or from Python, checked once.
 
 A scenario names parts by their ``kind`` (``[wind] kind = "constant"``); the other keys of such a table are the
-settings of that part. Built-in scenarios are in ``rotorfault/scenarios``; ``rotorfault new scenario`` writes a
+settings of that part. Built-in scenarios are in ``scenario/builtin``; ``rotorfault new scenario`` writes a
 commented one to start from.
 """
 
@@ -23,7 +23,7 @@ from rotorfault.base.foreign import is_place
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
-from rotorfault.plant.ground import GROUND, LARGEST_STEP
+from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.part import Part, field_of
 from rotorfault.scenario.slots import SLOTS
@@ -133,13 +133,13 @@ class Scenario(Strict):
             raise refusal(
                 "record_period", f"got {self.record_period:g} s; allowed: a multiple of the period {self.period:g} s"
             )
-        if self.maybe(GROUND) is None and self[ON_FAULT].kind == "land":
+        if self.maybe(GROUND) is None and getattr(self[ON_FAULT].factory, "lands", False):
             raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
-        if self.maybe(GROUND) is not None and self.period / self.substeps > LARGEST_STEP * (1.0 + PERIOD_TOLERANCE):
-            raise refusal(
-                "step",
-                f"got {self.period / self.substeps:g} s; allowed with ground: up to {LARGEST_STEP:g} s, for contact is stiff",
-            )
+        if (ground := self.maybe(GROUND)) is not None:
+            step, longest = self.period / self.substeps, ground.make().longest_step()
+            if step > longest * (1.0 + PERIOD_TOLERANCE):
+                allowed = f"allowed with this ground: up to {longest:g} s, for contact is stiff"
+                raise refusal("step", f"got {step:g} s; {allowed}")
         if self.duration < self.period:
             raise refusal("duration", f"got {self.duration:g} s; allowed: at least one period, {self.period:g} s")
         if not self.duration / self.period < 5e7:
@@ -225,5 +225,13 @@ def scenario_fields() -> dict[str, Any]:
 
 
 def named_places(overrides: Mapping[str, Any]) -> frozenset[str]:
-    """Places of code that a user has named himself, among values in place of a scenario's."""
-    return frozenset(value for value in overrides.values() if isinstance(value, str) and is_place(value))
+    """Places of code that a user has named himself, anywhere among values in place of a scenario's."""
+
+    def places(value: Any) -> Iterator[str]:
+        if isinstance(value, str):
+            yield from (value,) if is_place(value) else ()
+        elif isinstance(value, (Mapping, list, tuple)):
+            for inner in value.values() if isinstance(value, Mapping) else value:
+                yield from places(inner)
+
+    return frozenset(places(overrides))

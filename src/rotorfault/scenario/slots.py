@@ -50,7 +50,17 @@ class Slots:
         raise InputError(unknown("kind of part", name, [slot.name for slot in self._slots]))
 
     def insert(self, slot: Slot[Any], after: str) -> None:
-        """Give a new kind of part its place, behind that of another."""
+        """Give a new kind of part its place, behind that of another.
+
+        Raises
+        ------
+        InputError
+            If there is no such other, or a word of the new slot's streams of random numbers belongs to one already.
+        """
+        words = {word: other.name for other in self._slots for word in other.streams or ()}
+        for word in slot.streams or ():
+            if word in words:
+                raise InputError(f"slot {slot.name}: stream {word} belongs to {words[word]}; allowed: another word")
         self._slots.insert(1 + self._slots.index(self[after]), slot)
         self.version += 1
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotorfault._version import __version__
 from rotorfault.autopilot.control import CONTROLLER
-from rotorfault.base.errors import InputError
+from rotorfault.base.foreign import is_place
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble_all
@@ -22,7 +22,7 @@ from rotorfault.results.flight_data import flight_data
 from rotorfault.results.score_table import score_table
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import Scenario
-from rotorfault.tuning.space import SPACES, settings_at
+from rotorfault.tuning.space import SPACES, settings_at, space_of
 from rotorfault.tuning.training import objective, training_groups
 
 # Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which
@@ -33,6 +33,7 @@ SPREAD = 0.15
 class Tuned(NamedTuple):
     """What a search found, and how."""
 
+    controller: str
     settings: dict[str, Any]  # tables of the controller
     record: dict[str, Any]  # optimiser, budget, seed, objective
 
@@ -50,7 +51,7 @@ def tune(
     Parameters
     ----------
     controller : str
-        One of `rotorfault.tuning.space.SPACES`.
+        One of `rotorfault.tuning.space.SPACES`, or ``FILE.py:NAME`` for a class of your own with a `search`.
     generations, population : int
         Budget: their product is the number of candidates.
     seed : int
@@ -68,11 +69,9 @@ def tune(
     Raises
     ------
     InputError
-        If there is no search space for the controller.
+        If there is no search space for the controller, or it cannot be flown in a batch.
     """
-    if controller not in SPACES:
-        raise InputError(f"controller '{controller}' has no search space; allowed: {', '.join(SPACES)}")
-    space = SPACES[controller]
+    space = space_of(controller)
     groups = training_groups(controller, overrides or {})
     low, start, high = (np.log([entry[i] for entry in space]) for i in (1, 2, 3))
 
@@ -106,14 +105,15 @@ def tune(
         "version": __version__,
         **({"overrides": dict(overrides)} if overrides else {}),
     }
-    return Tuned(tables(search.result.xbest), record)
+    return Tuned(controller, tables(search.result.xbest), record)
 
 
 def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[list[Scenario]]) -> list[float]:
     """Mean objective of each candidate; the groups count alike."""
     total = np.zeros(len(candidates))
     for group in groups:
-        parts = [part_from(CONTROLLER, {"kind": controller, "preset": "none", **table}) for table in candidates]
+        start = {"kind": controller} | ({"preset": "none"} if controller in SPACES else {})
+        parts = [part_from(CONTROLLER, {**start, **table}, allow=(controller,)) for table in candidates]
         scenarios = [one.model_copy(update={CONTROLLER.name: part}) for part in parts for one in group]
         batch = assemble_all(scenarios)
         recording = load_engine(default_engine(len(scenarios)))(batch, no_watch)
@@ -129,7 +129,12 @@ def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[li
 
 
 def as_toml(tuned: Tuned, name: str) -> str:
-    """A preset as TOML text, with the record of how it was found."""
+    """A preset as TOML text, with the record of how it was found; of a controller of your own, a scenario's table."""
+    if is_place(tuned.controller):
+        record = [f"# {key}: {value}" for key, value in tuned.record.items()]
+        return (
+            "\n".join([*record, *_table({"kind": tuned.controller, **tuned.settings}, "controller")]).strip() + "\n"
+        )
     return "\n".join(_table({**tuned.settings, "record": tuned.record}, name)).strip() + "\n"
 
 

@@ -4,15 +4,22 @@ Every number is searched on a logarithmic scale between two bounds. Attitude wei
 they give at rest (k1, k2), which is the same choice in more telling numbers. What is not searched keeps the default
 of the law's settings: weights and reaching gains of the sliding surfaces, attitude R, and the weights of the position
 axes, of which only floor and cap of |e| are searched.
+
+A controller of a user's own says itself what may be searched (`Controller.search`).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.ismc import IsmcSettings
 from rotorfault.autopilot.control.roismc import RoismcSettings
 from rotorfault.autopilot.control.sdre import Weights
+from rotorfault.base.errors import InputError
+from rotorfault.base.foreign import is_place
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.part import part_from
 
 # Dotted key (below `controller`), lowest, start, highest; searched on a logarithmic scale.
 Space = list[tuple[str, float, float, float]]
@@ -57,9 +64,47 @@ SPACES: dict[str, Space] = {
 }  # fmt: skip
 
 
+def space_of(controller: str) -> Space:
+    """What may be searched of a controller.
+
+    Parameters
+    ----------
+    controller : str
+        Registered name, or a place in code, which is run.
+
+    Raises
+    ------
+    InputError
+        If it says nothing of a search, or gives bounds that are none.
+    """
+    if controller in SPACES:
+        return SPACES[controller]
+    if not is_place(controller):
+        raise InputError(
+            f"controller '{controller}' has no search space; allowed: {', '.join(SPACES)}, or FILE.py:NAME"
+        )
+    ranges = getattr(part_from(CONTROLLER, controller, allow=(controller,)).factory, "search", {})
+    if not ranges:
+        raise InputError(
+            f"controller '{controller}' does not say what to search; its class needs, for example, "
+            "search = {'stiffness': (1.0, 4.0, 20.0)}: lowest, first and highest value of a setting"
+        )
+    for key, (low, start, high) in ranges.items():
+        if not 0.0 < low <= start <= high or low == high:
+            raise InputError(
+                f"{controller}: search['{key}'] is {(low, start, high)}; "
+                "allowed: lowest, first and highest value, above 0 and in order"
+            )
+    return [(key, *bounds) for key, bounds in ranges.items()]
+
+
 def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
     """Controller tables for a point of the search space."""
     v = {key: float(f"{value:.4g}") for key, value in values.items()}
+    if controller not in SPACES:
+        own: dict[str, Any] = {}
+        override_all(own, v)
+        return own
     tables: dict[str, Any] = {"cascade": {key.split(".")[1]: x for key, x in v.items() if key.startswith("cascade.")}}
     law: dict[str, Any] = {}
 

@@ -111,11 +111,14 @@ def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -
     worth = _settling(error, times, onset, k) if tracking is None else tracking * float(np.sqrt(np.mean(error**2)))
     wrong = np.abs(flags[-1] - _FAULTY).sum() + flags[:k].max(axis=0, initial=0.0).sum()
     wrong += flags[k:, [1, 3]].max(axis=0, initial=0.0).sum()
-    virtual = data["controller.virtual_attitude"].values
+    # What the cascade asks of the attitude; other controllers ask for a torque.
+    known = "controller.virtual_attitude" in data
+    virtual = data["controller.virtual_attitude" if known else "torque_demand"].values
+    virtual = virtual if known else virtual / np.array([*scenario.vehicle.vehicle.inertia])
     return float(
         worth
         + float(wrong)
-        + COST_WEIGHT * math.log10(1.0 + scores["cost"])
+        + (COST_WEIGHT * math.log10(1.0 + scores["cost"]) if "controller.virtual_position" in data else 0.0)
         + max(0.0, float(scores["tilt_max"]) - TILT_FREE)
         + EFFORT_WEIGHT * math.log10(1.0 + float(np.mean(virtual**2)))
     )
@@ -130,5 +133,5 @@ def _settling(error: Array, times: Array, onset: float, k: int) -> float:
     late = (after[-1] + 1) * every if len(after) else 0.0
     left = LEFT_WEIGHT * float(excess[-1])
     if first < onset - every:
-        return float(first + late + max(0.0, float(excess[k:].max()) - EXCURSION_FREE) + left)
+        return float(first + late + max(0.0, float(excess[k:].max(initial=0.0)) - EXCURSION_FREE) + left)
     return float(INTERRUPTED * onset + late + left)

@@ -12,6 +12,7 @@ from allocation_cases import (
     PAPER,
     VEHICLES,
     Array,
+    allocate,
     belief,
     commands,
     demand_of,
@@ -19,7 +20,6 @@ from allocation_cases import (
     each_vehicle,
     inside,
     losses,
-    make,
     matrix,
     partial,
     wild,
@@ -70,7 +70,7 @@ def test_paper_s_inverse_is_36_with_the_numbering_of_4() -> None:
 @given(shares=wild, loss=losses)
 def test_commands_stay_within_the_limits(name: str, shares: tuple[float, ...], loss: tuple[float, ...]) -> None:
     for vehicle in VEHICLES.values():
-        c = commands(make(name).allocate(vehicle, demand_of(vehicle, shares), belief(*loss)))
+        c = commands(allocate(name, vehicle, demand_of(vehicle, shares), belief(*loss)))
         assert (c >= vehicle.thrust_min).all()
         assert (c <= vehicle.thrust_max).all()
 
@@ -80,7 +80,7 @@ def test_commands_stay_within_the_limits(name: str, shares: tuple[float, ...], l
 def test_report_is_demand_less_what_is_given(name: str, shares: tuple[float, ...], loss: tuple[float, ...]) -> None:
     for vehicle in VEHICLES.values():
         demand = demand_of(vehicle, shares)
-        result = make(name).allocate(vehicle, demand, belief(*loss))
+        result = allocate(name, vehicle, demand, belief(*loss))
         given_wrench = matrix(vehicle) @ ((1.0 - np.array(loss)) * vehicle.rotor_gain * commands(result))
         scale = np.array([1.0, 0.1, 0.1, 0.1]) * 1e-11 * vehicle.thrust_max
         gap = np.array(flatten(demand)) - given_wrench
@@ -97,7 +97,7 @@ def test_report_is_demand_less_what_is_given(name: str, shares: tuple[float, ...
 def test_sound_rotors_give_what_they_can(name: str, shares: tuple[float, ...]) -> None:
     for vehicle in VEHICLES.values():
         demand = demand_of(vehicle, shares)
-        result = make(name).allocate(vehicle, demand, healthy())
+        result = allocate(name, vehicle, demand, healthy())
         np.testing.assert_allclose(
             commands(result) * vehicle.rotor_gain, list(nominal_inverse(vehicle, demand)), rtol=1e-10
         )
@@ -110,20 +110,20 @@ def test_sound_rotors_give_what_they_can(name: str, shares: tuple[float, ...]) -
 def test_nan_in_the_demand_comes_through(name: str, flags: tuple[float, ...], place: int) -> None:
     numbers = [17.0, 0.1, 0.1, 0.01]
     numbers[place] = math.nan
-    result = make(name).allocate(PAPER, wrench(numbers), belief(*flags))
+    result = allocate(name, PAPER, wrench(numbers), belief(*flags))
     assert np.isnan(commands(result)).any()
     assert max(result.given_up) == 1.0
 
 
 @each_allocator
 def test_nan_in_the_belief_is_not_hidden(name: str) -> None:
-    result = make(name).allocate(PAPER, wrench((17.0, 0.0, 0.0, 0.0)), belief(math.nan, 0, 0, 0))
+    result = allocate(name, PAPER, wrench((17.0, 0.0, 0.0, 0.0)), belief(math.nan, 0, 0, 0))
     assert np.isnan(np.array(flatten(result))).any()
     assert result.given_up == Vec3(1.0, 1.0, 1.0)
 
 
 def test_effectiveness_sends_a_loss_that_is_nan_into_the_commands() -> None:
-    result = make("effectiveness").allocate(PAPER, wrench((17.0, 0.0, 0.0, 0.0)), belief(0, 0, math.nan, 0))
+    result = allocate("effectiveness", PAPER, wrench((17.0, 0.0, 0.0, 0.0)), belief(0, 0, math.nan, 0))
     assert np.isnan(commands(result)).any()
 
 
@@ -137,7 +137,7 @@ def test_attainable_demand_is_met_like_least_squares(shares: tuple[float, ...], 
         B = matrix(vehicle) @ np.diag((1.0 - np.array(loss)) * vehicle.rotor_gain)
         c = vehicle.thrust_min + np.array(shares) * (vehicle.thrust_max - vehicle.thrust_min)
         demand = B @ c
-        result = make("effectiveness").allocate(vehicle, wrench(demand), belief(*loss))
+        result = allocate("effectiveness", vehicle, wrench(demand), belief(*loss))
         rows = 1.0 / np.abs(B).max(axis=1)  # so that a metre of arm does not weigh against a metre of torque ratio
         bounds = (vehicle.thrust_min, vehicle.thrust_max)
         least = lsq_linear(rows[:, None] * B, rows * demand, bounds=bounds, method="bvls", tol=1e-14)
@@ -169,7 +169,7 @@ def test_unattainable_demand_is_cut_in_strict_order(shares: tuple[float, ...], l
         low = effect * vehicle.thrust_min
         high = np.where(dead, low, effect * vehicle.thrust_max)
         F_demand = np.array(shares) * vehicle.thrust_max * vehicle.rotor_gain
-        result = make("effectiveness").allocate(vehicle, demand_of(vehicle, shares), belief(*loss))
+        result = allocate("effectiveness", vehicle, demand_of(vehicle, shares), belief(*loss))
         F = commands(result) * effect
         fixed: list[tuple[Array, float]] = []
         for goal in np.array([[1.0, -1, 0, 0], [0, 0, 1, -1], [1, 1, 1, 1], [1, 1, -1, -1]]):
@@ -184,7 +184,7 @@ def test_a_dead_rotor_gets_exactly_the_least_thrust(vehicle: Vehicle, rotor: int
     for remaining, shares in itertools.product((0.0, 0.02, 0.0499), itertools.product((-0.5, 0.5, 1.5), repeat=4)):
         loss = [0.0] * 4
         loss[rotor] = 1.0 - remaining
-        result = make("effectiveness").allocate(vehicle, demand_of(vehicle, shares), belief(*loss))
+        result = allocate("effectiveness", vehicle, demand_of(vehicle, shares), belief(*loss))
         assert commands(result)[rotor] == vehicle.thrust_min
 
 
@@ -201,7 +201,7 @@ def test_growing_loss_changes_commands_smoothly_and_never_explodes(vehicle: Vehi
     for loss in sweep:
         losses_now = [0.0] * 4
         losses_now[rotor] = float(loss)
-        result = make("effectiveness").allocate(free, demand, belief(*losses_now))
+        result = allocate("effectiveness", free, demand, belief(*losses_now))
         table.append(commands(result))
         if loss < 0.95:
             assert result.given_up == Vec3(0.0, 0.0, 0.0)
@@ -225,7 +225,7 @@ def test_within_limits_a_growing_loss_leaves_ever_more_unallocated(rotor: int) -
     for loss in np.linspace(0.0, 1.0, 201):
         losses_now = [0.0] * 4
         losses_now[rotor] = float(loss)
-        result = make("effectiveness").allocate(PAPER, demand, belief(*losses_now))
+        result = allocate("effectiveness", PAPER, demand, belief(*losses_now))
         tilt, thrust, yaw = result.given_up
         assert tilt == 0.0
         thrust_gap.append(result.unallocated.thrust)
@@ -239,28 +239,27 @@ def test_within_limits_a_growing_loss_leaves_ever_more_unallocated(rotor: int) -
 
 
 def test_rank_loss_is_reported_axis_by_axis() -> None:
-    allocate = make("effectiveness").allocate
     strong = PAPER._replace(thrust_max=100.0)
     hover = strong.mass * strong.gravity
     level, tilted = wrench((hover, 0, 0, 0)), wrench((hover, 0, -1.0, 0))
-    one_dead = allocate(strong, level, belief(1, 0, 0, 0))
+    one_dead = allocate("effectiveness", strong, level, belief(1, 0, 0, 0))
     assert one_dead.given_up == Vec3(0.0, 0.0, 1.0)  # yaw alone: the partner rests, the other pair carries all
     assert commands(one_dead) == pytest.approx([0.0, 0.0, hover / 2, hover / 2])
-    assert allocate(strong, tilted, belief(1, 0, 0, 0)).given_up == Vec3(1.0, 0.0, 1.0)
-    pair_dead = allocate(strong, level, belief(0, 0, 1, 1))
+    assert allocate("effectiveness", strong, tilted, belief(1, 0, 0, 0)).given_up == Vec3(1.0, 0.0, 1.0)
+    pair_dead = allocate("effectiveness", strong, level, belief(0, 0, 1, 1))
     assert pair_dead.given_up == Vec3(0.0, 0.0, 1.0)
     assert commands(pair_dead) == pytest.approx([hover / 2, hover / 2, 0.0, 0.0])
-    both_arms = allocate(strong, level, belief(1, 0, 1, 0))
+    both_arms = allocate("effectiveness", strong, level, belief(1, 0, 1, 0))
     assert both_arms.given_up == Vec3(0.0, 1.0, 0.0)
     assert not commands(both_arms).any()
     assert both_arms.unallocated.thrust == hover
-    all_dead = allocate(strong, tilted, belief(1, 1, 1, 1))
+    all_dead = allocate("effectiveness", strong, tilted, belief(1, 1, 1, 1))
     assert all_dead.given_up == Vec3(1.0, 1.0, 0.0)
 
 
 def test_nominal_ignores_the_belief_but_reports_with_it() -> None:
     demand = wrench((17.0, 0.1, 0.1, 0.0))
-    sound, faulty = (make("nominal").allocate(PAPER, demand, b) for b in (healthy(), belief(0.25, 0, 0.35, 0)))
+    sound, faulty = (allocate("nominal", PAPER, demand, b) for b in (healthy(), belief(0.25, 0, 0.35, 0)))
     assert sound.command == faulty.command
     assert sound.given_up == Vec3(0.0, 0.0, 0.0)
     assert faulty.given_up == Vec3(1.0, 1.0, 1.0)

@@ -10,16 +10,16 @@ import pytest
 from allocation_cases import (
     PAPER,
     Array,
+    allocate,
     belief,
     demand_of,
     each_allocator,
-    make,
     wrench,
 )
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.autopilot.allocation import ALLOCATORS, Effectiveness, Nominal, PaperRule
+from rotorfault.autopilot.allocation import ALLOCATION, Effectiveness, Nominal, PaperRule
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.model.signals import Wrench, healthy
@@ -32,7 +32,7 @@ def paper_commands(flagged: tuple[int, ...], u1: float, u2: float, u4: float, u3
     """u1 roll and u2 pitch torque over the arm, u3 yaw torque over kappa, u4 thrust, as in (37) to (44)."""
     demand = wrench((u4, u1 * 0.42, u2 * 0.42, u3 * PAPER.torque_ratio))
     diagnosis = healthy()._replace(flagged=PerRotor(*(float(i in flagged) for i in (1, 2, 3, 4))))
-    return list(make("paper_rule").allocate(PAPER, demand, diagnosis).command)
+    return list(allocate("paper_rule", PAPER, demand, diagnosis).command)
 
 
 moments = st.floats(-1.5, 1.5)
@@ -66,13 +66,13 @@ def test_paper_rule_leaves_yaw_accelerating_under_the_paper_s_faults() -> None:
 @pytest.mark.parametrize("loss", [(0.3, 0.2, 0, 0), (0, 0, 0.5, 1.0), (0.1, 0.1, 0.1, 0), (0.2, 0.3, 0.4, 0.5)])
 def test_two_faults_on_one_axis_go_to_the_effectiveness_allocator(loss: tuple[float, ...]) -> None:
     demand = wrench((16.0, 0.2, -0.1, 0.02))
-    rule, other = (make(name).allocate(PAPER, demand, belief(*loss)) for name in ("paper_rule", "effectiveness"))
+    rule, other = (allocate(name, PAPER, demand, belief(*loss)) for name in ("paper_rule", "effectiveness"))
     assert rule == other
 
 
 def test_fallback_settings_are_passed_on() -> None:
     rule = PaperRule(PaperRule.Settings(fallback=Effectiveness.Settings(effectiveness_min=0.5)))
-    result = rule.allocate(PAPER, wrench((16.0, 0.0, 0.0, 0.0)), belief(0.6, 0.1, 0.0, 0.0))
+    result = allocate(rule, PAPER, wrench((16.0, 0.0, 0.0, 0.0)), belief(0.6, 0.1, 0.0, 0.0))
     assert result.command.r1 == 0.0
 
 
@@ -88,13 +88,11 @@ def inputs() -> Array:
 
 
 def step(name: str) -> Callable[..., list[Any]]:
-    allocator = make(name)
-
-    def allocate(*x: Any) -> list[Any]:
+    def answer(*x: Any) -> list[Any]:
         diagnosis = healthy()._replace(loss=PerRotor(*x[4:8]), flagged=PerRotor(*x[8:12]))
-        return flatten(allocator.allocate(PAPER, Wrench(x[0], Vec3(*x[1:4])), diagnosis))
+        return flatten(allocate(name, PAPER, Wrench(x[0], Vec3(*x[1:4])), diagnosis))
 
-    return allocate
+    return answer
 
 
 def on_heyoka(function: Callable[..., list[Any]], rows: Array) -> Array:
@@ -123,5 +121,6 @@ def test_engines_agree(name: str, engine: Callable[..., Array]) -> None:
 
 
 def test_registry_has_the_three() -> None:
-    assert dict(ALLOCATORS.items()) == {"effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule}
-    assert all(ALLOCATORS.summary(name) for name in ALLOCATORS)
+    registry = ALLOCATION.registry
+    assert dict(registry.items()) == {"effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule}
+    assert all(registry.summary(name) for name in registry)

@@ -7,13 +7,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cascade_step import VEHICLE, Array, arr, attitudes, cascade, controller_step, number, sound_thrust
+from cascade_step import (
+    CONTROLLERS,
+    VEHICLE,
+    Array,
+    arr,
+    attitudes,
+    cascade,
+    controller_step,
+    estimate,
+    number,
+    sound_thrust,
+)
 from gates import needs_simd
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from rotorfault.autopilot.control import CONTROLLERS
 from rotorfault.autopilot.control.cascade import (
     AttitudeReference,
     CascadeSettings,
@@ -26,8 +36,8 @@ from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble, assemble_all
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.rotation import body_z_axis
-from rotorfault.model.signals import Measurement, Reference
-from rotorfault.model.telemetry import SIGNAL_NAMES
+from rotorfault.model.block import Context
+from rotorfault.model.signals import Reference
 from rotorfault.scenario.scenario import Scenario, scenario_from
 
 each_controller = pytest.mark.parametrize("name", list(CONTROLLERS))
@@ -35,13 +45,13 @@ each_controller = pytest.mark.parametrize("name", list(CONTROLLERS))
 
 @given(attitude=attitudes, size=st.floats(0.1, 50.0), yaw_ref=number)
 def test_attitude_for_inverts_the_thrust_axis(attitude: Vec3, size: float, yaw_ref: float) -> None:
-    found = attitude_for(body_z_axis(attitude) * size, attitude.z, yaw_ref)
+    found = attitude_for(body_z_axis(attitude) * size, math.cos(attitude.z), math.sin(attitude.z), yaw_ref)
     np.testing.assert_allclose(arr(found), [attitude.x, attitude.y, yaw_ref], atol=1e-12)
 
 
 @given(f=st.builds(Vec3, *[st.floats(-60.0, 60.0)] * 3), tilt=st.floats(0.1, 1.4), share=st.floats(0.6, 1.0))
 def test_force_limits(f: Vec3, tilt: float, share: float) -> None:
-    numbers = cascade(tilt_max=tilt, thrust_share=share, fall_share=0.3).parameters(VEHICLE, 1e-3)
+    numbers = cascade(tilt_max=tilt, thrust_share=share, fall_share=0.3).parameters(Context(VEHICLE, 1e-3))
     most, least = share * 4.0 * VEHICLE.thrust_max / VEHICLE.mass, 0.3 * VEHICLE.gravity
     given_, wanted = arr(limited_force(f, sound_thrust(VEHICLE), VEHICLE, numbers)), arr(f)
     # The vertical part comes first: whatever is asked for sideways, it is cut by its own limits only.
@@ -86,24 +96,20 @@ def test_command_filter_turns_the_short_way() -> None:
 @each_controller
 def test_command_filter_starts_at_the_measured_attitude(name: str) -> None:
     attitude = Vec3(0.6, -0.5, 2.0)
-    seen = Measurement(zeros(), zeros(), attitude, Vec3(0.3, 0.2, 0.1))
+    seen = estimate(zeros(), zeros(), attitude, Vec3(0.3, 0.2, 0.1))
     wanted = Reference(Vec3(1.0, 1.0, 1.0), zeros(), zeros(), 0.0, 0.0, 0.0)
-    before, _, output = controller_step(cascade(name), VEHICLE, seen, wanted)
-    assert before.reference == AttitudeReference(attitude, zeros())
-    assert output.telemetry.attitude_command == attitude
-    level = controller_step(cascade(name, six_inputs=True), VEHICLE, seen, wanted)[0]
-    assert level.reference == AttitudeReference(zeros(), zeros())
+    first = controller_step(cascade(name), VEHICLE, seen, wanted)
+    assert first.before.reference == AttitudeReference(attitude, zeros())
+    assert first.telemetry.attitude_command == attitude
+    level = controller_step(cascade(name, six_inputs=True), VEHICLE, seen, wanted)
+    assert level.before.reference == AttitudeReference(zeros(), zeros())
 
 
-def flown(tables: dict[str, Any], engine: str = "python") -> tuple[Array, Array]:
-    """Times and signals (records, rows, flights) of one scenario."""
-    scenario = scenario_from({"name": "test", "vehicle": "paper"} | tables, "test")
-    recording = load_engine(engine)(assemble(scenario), no_watch)
-    return recording.steps * scenario.period, recording.signals[:, :, 0]
-
-
-def row(signals: Array, name: str) -> Array:
-    return signals[:, SIGNAL_NAMES.index(name)]
+def flown(tables: dict[str, Any]) -> dict[str, Array]:
+    """Rows of one scenario's flight by name."""
+    batch = assemble(scenario_from({"name": "test", "vehicle": "paper"} | tables, "test"))
+    recording = load_engine("python")(batch, no_watch)
+    return dict(zip(batch.loop.layout.rows, recording.signals[:, :, 0].T, strict=True))
 
 
 def test_six_inputs_is_labelled_and_acts() -> None:
@@ -120,10 +126,10 @@ def test_six_inputs_is_labelled_and_acts() -> None:
     tilts = {}
     for six_inputs in (True, False):
         controller = {"kind": "ismc", "preset": "none", "cascade": {"six_inputs": six_inputs}}
-        _, signals = flown(task | {"controller": controller})
-        tilts[six_inputs] = max(np.abs(row(signals, f"attitude.{axis}")).max() for axis in "xy")
-        assert row(signals, "position.x")[-1] == pytest.approx(0.5, abs=0.05)
-        assert row(signals, "position.y")[-1] == pytest.approx(-0.5, abs=0.05)
+        signals = flown(task | {"controller": controller})
+        tilts[six_inputs] = max(np.abs(signals[f"attitude.{axis}"]).max() for axis in "xy")
+        assert signals["position.x"][-1] == pytest.approx(0.5, abs=0.05)
+        assert signals["position.y"][-1] == pytest.approx(-0.5, abs=0.05)
     assert tilts[True] < 1e-9
     assert tilts[False] > 0.05
 
@@ -152,12 +158,13 @@ def test_attitude_pairs_converge(name: str) -> None:
     for yaw in (0.0, 3.1, -3.1):
         batch = assemble_all([attitude_pair(yaw, start, name) for start in starts])
         signals = load_engine("simd")(batch, no_watch).signals
-        last = {part: [signals[-1, SIGNAL_NAMES.index(f"{part}.{a}")] for a in "xyz"] for part in
-                ("position", "velocity", "attitude", "body_rates")}  # fmt: skip
-        gap = np.array(last["attitude"][2]) - yaw
+        place = batch.loop.layout.place
+        last = {part: signals[-1, place(part)] for part in ("position", "velocity", "attitude", "body_rates")}
+        gap = last["attitude"][2] - yaw
         assert np.abs(np.arctan2(np.sin(gap), np.cos(gap))).max() < 0.01
         assert np.abs(last["attitude"][:2]).max() < 0.01
         for part in ("position", "velocity", "body_rates"):
             assert np.abs(last[part]).max() < 0.02, part
-        turned = np.abs(np.diff(np.unwrap(signals[:, SIGNAL_NAMES.index("attitude.z")], axis=0), axis=0)).sum(axis=0)
+        course = np.unwrap(signals[:, place("attitude")][:, 2], axis=0)
+        turned = np.abs(np.diff(course, axis=0)).sum(axis=0)
         assert turned.max() < 6.0

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from cascade_step import CONTROLLERS
 from numpy.typing import NDArray
 
-from rotorfault.autopilot.control import CONTROLLERS, integral_sliding
+from rotorfault.autopilot.control import integral_sliding
 from rotorfault.autopilot.control.integral_sliding import SwitchingGains, SwitchingSettings
 from rotorfault.autopilot.control.ismc import Ismc
 from rotorfault.autopilot.control.protocol import TrackingError
@@ -18,10 +19,10 @@ from rotorfault.autopilot.control.smc import SlidingParameters, Smc
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.flight.assembly import assemble
-from rotorfault.loop.closed_loop import quiet
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.model.block import Context, Nothing
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.reference.sources import ReferenceTable
+from rotorfault.reference import REFERENCE
 from rotorfault.scenario.scenario import scenario_from
 
 Array = NDArray[np.float64]
@@ -47,7 +48,7 @@ def rows(v: Vec3) -> Array:
 
 
 def first_signals(controller: str, law: dict[str, Any]) -> Any:
-    """What the closed loop reports at its first sampling instant, started in full motion."""
+    """What the controller reports at its first sampling instant in the closed loop, started in full motion."""
     scenario = scenario_from(
         {
             "name": "first",
@@ -65,8 +66,9 @@ def first_signals(controller: str, law: dict[str, Any]) -> Any:
         "test",
     )
     batch = assemble(scenario)
-    table: ReferenceTable = scenario.reference.make().table(np.zeros(1))
-    return batch.loop.step(batch.state, quiet(table.at(0)), batch.parameters)[1]
+    drive = batch.loop.drive(scenario[REFERENCE].make().table(np.zeros(1)).at(0))
+    signals: Any = batch.loop.step(batch.state, drive, batch.parameters)[1]
+    return signals.parts.controller
 
 
 def test_there_are_laws_with_a_surface() -> None:
@@ -136,7 +138,7 @@ def ideal_run(law: Any, group: str, case: Ideal, *, start_off: bool, excess: flo
     The virtual inputs come about at once and the step is small, so that sigma' = n (u_sw + delta) to rounding.
     """
     dt = 5e-4
-    parameters = law.parameters(VEHICLE, dt)._replace(**{group: case.gains})
+    parameters = law.parameters(Context(VEHICLE, dt))._replace(**{group: case.gains})
     drift = Mat3.diagonal(zeros())
     if group == "attitude":
         drift = gyroscopic_drift(VEHICLE, vec(case.drift_rate), 40.0)
@@ -222,7 +224,7 @@ def test_sigma_stays_in_the_layer_for_good(law: type, group: str, nominal: str) 
 def lagged_run(law: Any, group: str, disturbance: Vec3, seconds: float, bandwidth: float) -> tuple[Any, Array, Array]:
     """Last output, last error and sigma over time, under a constant disturbance behind an exact lag."""
     dt = 1e-3
-    parameters = law.parameters(VEHICLE, dt)
+    parameters = law.parameters(Context(VEHICLE, dt))
     e = rate = lagged = predicted = zeros()
     still, lag = Mat3.diagonal(zeros()), Vec3(bandwidth, bandwidth, bandwidth)
     decay = float(np.exp(-bandwidth * dt))
@@ -248,7 +250,7 @@ def test_sigma_comes_to_rest_where_switching_balances_the_disturbance(law: type,
     made = law(law.Settings(nominal=nominal))
     disturbance = Vec3(0.5, -0.3, 0.4)
     output, e, sigma = lagged_run(made, "position", disturbance, 12.0, 15.0)
-    gains = made.parameters(VEHICLE, 1e-3).position
+    gains = made.parameters(Context(VEHICLE, 1e-3)).position
     steepness = (gains.k.over(gains.weight.map(abs)) + Vec3(1.0, 1.0, 1.0) * gains.gamma_0) / gains.layer
     expected = gains.weight.times(disturbance.over(steepness))
     np.testing.assert_allclose(sigma[-1], list(expected), rtol=1e-3)
@@ -299,12 +301,12 @@ def test_smc_reaches_its_surface_in_time(group: str, form: str, eta: float) -> N
         e, rate = draw.normal(size=(2, 3, CASES))
         slope = draw.uniform(0.5, 2.0, (3, CASES))
         numbers = SlidingParameters(vec(slope), Vec3(eta, eta, eta), vec(K), layer)
-        parameters = law.parameters(VEHICLE, dt)._replace(**{group: numbers})
+        parameters = law.parameters(Context(VEHICLE, dt))._replace(**{group: numbers})
         s_0 = rate + slope * e
         reached = np.full((3, CASES), np.inf)
         for k in range(int(np.max(np.abs(s_0) / rate_of_reaching) / dt) + 3):
             error = TrackingError(vec(e), vec(rate), vec(rate), zeros(), zeros(), drift, zeros())
-            _, output = getattr(law, group)((), error, parameters, dt)
+            _, output = getattr(law, group)(Nothing(), error, parameters, dt)
             here = rows(output.sigma)
             hit = np.abs(here) <= layer if form == "smooth" else here * np.sign(s_0) <= 0.0
             reached = np.where(hit & np.isinf(reached), k * dt, reached)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cascade_step import VEHICLE, Array, arr, attitudes, cascade, controller_step, number
+from cascade_step import VEHICLE, Array, arr, attitudes, cascade, controller_step, estimate, number
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag, solve_continuous_are
@@ -32,9 +32,11 @@ from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.rotation import body_z_axis
-from rotorfault.model.signals import Measurement, Reference
+from rotorfault.model.block import Context
+from rotorfault.model.motion import angular_acceleration
+from rotorfault.model.signals import Reference
 from rotorfault.model.vehicle import gyroscopic_torque
-from rotorfault.plant.models import acceleration, angular_acceleration
+from rotorfault.plant.models import acceleration
 from rotorfault.plant.wind import Air
 
 # Three different moments of inertia and a heavy rotor: nothing cancels by luck.
@@ -82,12 +84,12 @@ def test_attitude_error_dynamics_are_those_designed_for(
     made = cascade("smc")
     wanted = Reference(zeros(), zeros(), zeros(), 0.4, 0.0, 0.0)
     reference = AttitudeReference(held, held_rate)
-    seen = Measurement(p, zeros(), attitude, omega)
-    before, _, output = controller_step(made, UNEVEN, seen, wanted, reference=reference, residual=residual)
-    _, reference_acceleration = filtered(before.reference, output.telemetry.attitude_demand, 25.0, 1e-3)
-    true = angular_acceleration(UNEVEN, output.wrench.torque_B, omega, residual) - reference_acceleration
-    designed = gyroscopic_drift(UNEVEN, omega, residual) @ (omega - held_rate) + output.telemetry.virtual_attitude
-    scale = 1.0 + np.abs(arr(reference_acceleration)).max() + np.abs(arr(output.telemetry.virtual_attitude)).max()
+    seen = estimate(p, zeros(), attitude, omega)
+    before, _, wrench, telemetry = controller_step(made, UNEVEN, seen, wanted, reference=reference, residual=residual)
+    _, reference_acceleration = filtered(before.reference, telemetry.attitude_demand, 25.0, 1e-3)
+    true = angular_acceleration(UNEVEN, wrench.torque_B, omega, residual) - reference_acceleration
+    designed = gyroscopic_drift(UNEVEN, omega, residual) @ (omega - held_rate) + telemetry.virtual_attitude
+    scale = 1.0 + np.abs(arr(reference_acceleration)).max() + np.abs(arr(telemetry.virtual_attitude)).max()
     scale += arr(omega) @ arr(omega) + arr(held_rate) @ arr(held_rate) + abs(residual)
     np.testing.assert_allclose(arr(true), arr(designed), atol=1e-12 * scale)
 
@@ -97,15 +99,14 @@ def test_position_error_dynamics_are_those_designed_for(p: Vec3, v: Vec3, yaw: f
     """e'' = u once the body has the attitude that is asked for, with drag, gravity and reference compensated."""
     made = cascade("sdre", tilt_max=1.4, cos_min=0.05, thrust_share=1.0)
     wanted = Reference(zeros(), Vec3(0.1, -0.2, 0.1), Vec3(0.5, -0.3, 0.4), yaw, 0.0, 0.0)
-    roll, pitch, _ = controller_step(made, VEHICLE, Measurement(p, v, Vec3(0.0, 0.0, yaw), zeros()), wanted)[
-        2
-    ].telemetry.attitude_demand
-    seen = Measurement(p, v, Vec3(roll, pitch, yaw), zeros())
-    output = controller_step(made, VEHICLE, seen, wanted)[2]
-    true = acceleration(VEHICLE, output.wrench.thrust, body_z_axis(seen.attitude), v, Air(zeros(), zeros()), zeros())
-    k1, k2 = position_gains(p, made.parameters(VEHICLE, 1e-3).law)
+    level = estimate(p, v, Vec3(0.0, 0.0, yaw), zeros())
+    roll, pitch, _ = controller_step(made, VEHICLE, level, wanted).telemetry.attitude_demand
+    attitude = Vec3(roll, pitch, yaw)
+    _, _, wrench, telemetry = controller_step(made, VEHICLE, estimate(p, v, attitude, zeros()), wanted)
+    true = acceleration(VEHICLE, wrench.thrust, body_z_axis(attitude), v, Air(zeros(), zeros()), zeros())
+    k1, k2 = position_gains(p, made.parameters(Context(VEHICLE, 1e-3)).law)
     u = -k1.times(p) - k2.times(v - wanted.v_W)
-    if np.abs(arr(u - output.telemetry.virtual_position_W)).max() < 1e-12:  # not limited
+    if np.abs(arr(u - telemetry.virtual_position)).max() < 1e-12:  # not limited
         np.testing.assert_allclose(arr(true - wanted.a_W), arr(u), atol=1e-11)
     else:
         assert np.linalg.norm(arr(u)) > 2.0
@@ -124,7 +125,7 @@ WEIGHTS = [
 def test_sdre_without_gyroscopics_is_lqr(weights: Weights) -> None:
     """All twelve states at once by SciPy's Riccati solver, against the structured one."""
     law = Sdre(weights)
-    numbers = law.parameters(VEHICLE, 1e-3)
+    numbers = law.parameters(Context(VEHICLE, 1e-3))
     e = Vec3(0.7, -0.05, 0.0)
     memory = law.initial(error(e, zeros()), error(zeros(), zeros()), numbers)
     position = law.position(memory.position, error(e, zeros()), numbers, 1e-3)[1]
@@ -155,7 +156,7 @@ def test_the_papers_attitude_weights_have_the_poles_decoded() -> None:
 
 def law_poles(law: Any, group: str, e: float) -> Array:
     """Closed-loop poles per axis about an error e, from differences of the law's own output; shape (3, 2)."""
-    numbers = law.parameters(VEHICLE, 1e-3)
+    numbers = law.parameters(Context(VEHICLE, 1e-3))
     h, at = 1e-6, Vec3(e, e, e)
     memory = getattr(law.initial(error(at, zeros()), error(at, zeros()), numbers), group)
 
@@ -205,7 +206,7 @@ def test_ismc_divides_by_its_negative_weight() -> None:
     settings = Ismc.Settings()
     assert max(settings.attitude.weight) < 0.0
     law = Ismc(settings)
-    numbers = law.parameters(VEHICLE, 1e-3)
+    numbers = law.parameters(Context(VEHICLE, 1e-3))
     surface = law.initial(error(zeros(), zeros()), error(zeros(), zeros()), numbers).attitude
     fast = Vec3(2.0, 3.0, 4.0)  # faster than the nominal law meant
     unmeant = error(zeros(), zeros())._replace(rate=fast)
@@ -218,7 +219,7 @@ def test_ismc_divides_by_its_negative_weight() -> None:
 def test_ismc_is_stable_under_a_disturbance(group: str) -> None:
     """Ideal actuators, gyroscopic drift, a disturbance of 60 % of the bound: the error dies out."""
     law, dt = Ismc(Ismc.Settings()), 1e-3
-    numbers = law.parameters(VEHICLE, dt)
+    numbers = law.parameters(Context(VEHICLE, dt))
     drift = STILL if group == "position" else gyroscopic_drift(UNEVEN, Vec3(2.0, -1.0, 3.0), 100.0)
     delta = Vec3(0.6, -0.6, 0.6) * getattr(numbers, group).gamma_0
     e, rate, predicted = Vec3(0.5, -0.4, 0.3), zeros(), zeros()

@@ -16,13 +16,13 @@ def test_boundaries_go_where_they_must(plane: Maps) -> None:
     (part,), count = curves.slices(plane)
     assert count == 1
     half = curves.crossings(plane, plane.variants[1], part, 0.5)
-    # Survival 1, 0.5, 0 at losses 0.2, 0.4, 0.6, in every wind.
+    # Success rate 1, 0.5, 0 at losses 0.2, 0.4, 0.6, in every wind.
     assert (half.along == 0).all()
     np.testing.assert_allclose(half.points, [[0.4, 0.0], [0.4, 4.0], [0.4, 8.0]])
     np.testing.assert_allclose(half.lines[0][:, 0], 0.4)
     high = curves.crossings(plane, plane.variants[1], part, 0.99)
     np.testing.assert_allclose(high.points[:, 0], 0.2 + 0.2 * 0.02)
-    bounds = intervals([24, 12, 0], 24, Refinement(24, 24, most=24))
+    bounds = intervals([24, 12, 0], 24, Refinement(initial=24, block=24, most=24))
     flown = study_of([LOSS, WIND], refine={"initial": 24, "block": 24, "most": 24})
     many = maps(flown, table_of(flown, falling, lambda *_: 24))
     half = curves.crossings(many, many.variants[1], part, 0.5)

@@ -21,11 +21,11 @@ def made(request: pytest.FixtureRequest) -> tuple[str, Maps, dict[str, Figure]]:
 def test_figures_cover_nothing(made: tuple[str, Maps, dict[str, Figure]]) -> None:
     name, _, drawn = made
     wanted = {
-        "plane": {"survival", "difference", "outcomes", "recovery"},
-        "line": {"survival", "difference", "outcomes", "recovery"},
-        "names": {"survival", "outcomes", "recovery"},
-        "space": {"survival-one", "survival-two", "difference-one-two", "outcomes", "recovery"},
-        "odd": {"survival", "difference", "outcomes", "recovery"},
+        "plane": {"success", "difference", "grades", "recovery"},
+        "line": {"success", "difference", "grades", "recovery"},
+        "names": {"success", "grades", "recovery"},
+        "space": {"success-one", "success-two", "difference-one-two", "grades", "recovery"},
+        "odd": {"success", "difference", "grades", "recovery"},
     }
     assert set(drawn) == wanted[name]
     for title, figure in drawn.items():
@@ -41,4 +41,4 @@ def test_no_more_slices_than_can_be_looked_at() -> None:
     parts, count = curves.slices(found)
     assert (len(parts), count) == (curves.MOST_SLICES, 9)
     assert (parts[0].title, parts[-1].title) == ("mass 0.8", "mass 1.2")
-    assert "6 of 9" in figures.draw(found)["survival-one"].legends[0].get_title().get_text()
+    assert "6 of 9" in figures.draw(found)["success-one"].legends[0].get_title().get_text()

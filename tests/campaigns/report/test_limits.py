@@ -1,13 +1,20 @@
-"""What rotors can hold, cell by cell: the hover margin, told only where it is known."""
+"""What rotors can hold, cell by cell: the hover margin, drawn only where faults and winds know what stays."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import pytest
+from campaign_studies import TINY
 from campaign_tables import LOSS, TWO_FAULTS, WIND, study_of
+from places import EXAMPLES
 
 from rotorfault.analysis.hover import hover_margin
-from rotorfault.campaigns.report.limits import limits
+from rotorfault.campaigns.report.limits import Limits, limits
 from rotorfault.campaigns.report.maps import Maps
+from rotorfault.campaigns.study import study_from
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle_file import load_vehicle
 
@@ -47,3 +54,53 @@ def test_attainable_is_not_told_where_it_depends_or_is_not_known() -> None:
     fault = {"kind": "stuck", "rotor": 1, "time": 1.0, "thrust": 1.0}
     stuck = study_of([WIND], settings={"fault": [fault]})
     assert limits(stuck, 0, {"wind_speed": np.array([0.0])}) is None
+
+
+# ----------------------------------------------------------------------------------------------- parts that are asked
+
+
+def of_masses(**settings: Any) -> Limits | None:
+    """Of the paper's vehicle with 0.6 to 2.4 of its mass, in a flight of 10 s in still air, with other settings."""
+    masses = np.linspace(0.6, 2.4, 25)
+    tables = {**TINY, "axis": [{"name": "mass", "values": masses.tolist()}], "draw": []}
+    calm = {"duration": 10.0, "wind": "none", **settings}
+    return limits(study_from({**tables, "settings": calm}, "test", allow_code=True), 0, {"mass": masses})
+
+
+def margin_of(loss: float, wind_z: float = 0.0) -> Limits:
+    vehicle = load_vehicle("paper").vehicle
+    vehicle = vehicle._replace(mass=vehicle.mass * np.linspace(0.6, 2.4, 25))
+    margin = hover_margin(vehicle, PerRotor(loss, 0.0, 0.0, 0.0), Vec3(0.0, 0.0, wind_z))
+    return Limits(np.asarray(margin.with_yaw, dtype=float), np.asarray(margin.without_yaw, dtype=float))
+
+
+TWO = [{"kind": "step", "time": 1.0, "loss": 0.2}, {"kind": "step", "time": 2.0, "loss": 0.25}]
+FAULTS: dict[str, tuple[list[dict[str, Any]], float]] = {
+    "a ramp ends at its loss": ([{"kind": "ramp", "start": 1.0, "end": 2.0, "loss": 0.3}], 0.3),
+    "a total loss": ([{"kind": "total", "time": 1.0}], 1.0),
+    "it comes and goes": ([{"kind": "intermittent", "start": 1.0, "end": 5.0, "period": 1.0, "loss": 0.9}], 0.0),
+    "what two leave": (TWO, 0.4),
+    "after the flight": ([{"kind": "step", "time": 11.0, "loss": 0.9}], 0.0),
+    "one of one's own": ([{"kind": f"{EXAMPLES / 'fault.py'}:WornRotor", "start": 1.0, "loss": 0.35}], 0.35),
+}
+
+
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_faults_say_what_loss_stays(name: str) -> None:
+    faults, loss = FAULTS[name]
+    found, margin = of_masses(fault=[{**fault, "rotor": 1} for fault in faults]), margin_of(loss)
+    np.testing.assert_array_equal(found, margin)
+    assert 0.0 < np.mean(margin) < 1.0, "a map with one answer everywhere would prove nothing"
+
+
+def test_winds_say_their_mean(tmp_path: Path) -> None:
+    """One of one's own, from above, counts; those without a mean, or that push in other ways, give no limit."""
+    (tmp_path / "own.py").write_text(
+        "import rotorfault as rf\n\n\nclass Down(rf.Wind):\n    def mean_velocity(self, parameters):\n"
+        "        return rf.Vec3(0.0, 0.0, -40.0)\n"
+    )
+    found = of_masses(wind=f"{tmp_path / 'own.py'}:Down", fault=[])
+    np.testing.assert_array_equal(found, margin_of(0.0, -40.0))
+    assert np.sum(found) < np.sum(margin_of(0.0))
+    assert of_masses(wind=f"{EXAMPLES / 'wind.py'}:GustFront", fault=[]) is None
+    assert of_masses(wind="paper", fault=[]) is None

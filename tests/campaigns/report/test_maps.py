@@ -18,12 +18,12 @@ def test_counts_shares_and_intervals(plane: Maps) -> None:
     two = plane.variants[1]
     assert two.label == "two"
     np.testing.assert_array_equal(two.flights, np.full((5, 3), FIRST))
-    np.testing.assert_array_equal(two.survived[:, 0], [8, 8, 4, 0, 0])
-    np.testing.assert_array_equal(two.survival[:, 2], [1.0, 1.0, 0.5, 0.0, 0.0])
-    bounds = intervals(two.survived, two.flights, plane.study.refine.refinement())
+    np.testing.assert_array_equal(two.successes[:, 0], [8, 8, 4, 0, 0])
+    np.testing.assert_array_equal(two.success_rate[:, 2], [1.0, 1.0, 0.5, 0.0, 0.0])
+    bounds = intervals(two.successes, two.flights, plane.study.refine)
     np.testing.assert_array_equal([two.lower, two.upper], bounds)
-    np.testing.assert_array_equal(two.grades[:, 2, 1], [2, 0, 2, 0, 0, 4, 0])
-    np.testing.assert_allclose(two.shares[:, 2], [0.25, 0, 0.25, 0, 0, 0.5, 0])
+    np.testing.assert_array_equal(two.grades[:, 2, 1], [2, 0, 2, 0, 0, 0, 4])
+    np.testing.assert_allclose(two.shares[:, 2], [0.25, 0, 0.25, 0, 0, 0, 0.5])
     assert two.total.estimate == pytest.approx(0.5)
     assert 0.0 < two.total.lower < 0.5 < two.total.upper < 1.0
     assert plane.flights == 2 * 15 * FIRST
@@ -37,7 +37,7 @@ def test_quantiles_do_not_leave_out_who_never_recovers(plane: Maps) -> None:
     np.testing.assert_allclose(two.recovery[:, 2, 0], [0.1, 0.4, np.inf])
     np.testing.assert_allclose(two.recovery_along[:, 2], [0.1, 0.4, np.inf])
     assert np.isinf(two.recovery[:, 4]).all()
-    # One that tumbles is over before it has fallen far: it counts as lost altogether.
+    # A lost flight is over before it has fallen far: it counts as having lost more altitude than all others.
     np.testing.assert_allclose(two.altitude[:, 2, 0], [0.01, 0.04, np.inf])
 
 
@@ -53,7 +53,7 @@ def test_flights_that_never_failed_have_no_recovery() -> None:
 def test_axis_values_in_any_order_make_the_same_map(plane: Maps) -> None:
     turned = study_of([{"name": "loss", "values": LOSS["values"][::-1]}, WIND])
     found = maps(turned, table_of(turned, lambda label, place: falling(label, (4 - place[0], place[1]))))
-    np.testing.assert_array_equal(found.variants[0].survived, plane.variants[0].survived)
+    np.testing.assert_array_equal(found.variants[0].successes, plane.variants[0].successes)
     assert found.views[0].values == LOSS["values"]
     np.testing.assert_array_equal(found.variants[0].cell[0], [12, 13, 14])
 
@@ -65,7 +65,7 @@ def test_only_whole_rounds_in_a_row_count() -> None:
     keep = ~((table["cell"].to_numpy() == 3) & (table["number"].to_numpy() == 0))
     found = maps(study, table.filter(keep))
     np.testing.assert_array_equal(found.variants[0].flights, [FIRST, FIRST, FIRST, 0, FIRST])
-    assert np.isnan(found.variants[0].survival[3])
+    assert np.isnan(found.variants[0].success_rate[3])
     assert found.left_out == 2 * (3 + FIRST - 1)
     assert not found.complete
     with pytest.raises(InputError, match="no cell has a whole round"):
@@ -88,16 +88,16 @@ def test_a_campaign_is_complete_when_sampling_asks_for_no_more(plane: Maps) -> N
     assert maps(study, table_of(study, falling)).complete
 
 
-def test_the_first_lost_flight_is_named(plane: Maps) -> None:
+def test_the_first_flight_that_failed_is_named(plane: Maps) -> None:
     two = plane.variants[1]
-    np.testing.assert_array_equal(two.first_lost[:2], -1)
+    np.testing.assert_array_equal(two.first_failure[:2], -1)
     cell, number = 2 * 3, 4
-    assert two.first_lost[2, 0] == (number * 15 + cell) * 2 + 1
+    assert two.first_failure[2, 0] == (number * 15 + cell) * 2 + 1
 
 
 def test_pairs_are_the_flights_that_both_flew() -> None:
     study = study_of([LOSS])
-    # Eight flights in common; of these one survives 6 (of its 16 flights too, it is 6) and two survives 4.
+    # Eight flights in common; of these one succeeds in 6 (of its 16 flights too, it is 6) and two succeeds in 4.
     share = {"one": 6 / 16, "two": 4 / 8}
     found = maps(study, table_of(study, lambda label, _: share[label], lambda label, _: {"one": 16, "two": 8}[label]))
     pair = found.pairings[0]

@@ -40,7 +40,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     study = STUDIES["plane"]
     folder = tmp_path_factory.mktemp("a campaign")
     paths = report.write(study, table_of(study, falling), folder, {"rotorfault": "0.0"})
-    assert [path.name for path in paths[:3]] == ["report.html", "survival.png", "survival.svg"]
+    assert [path.name for path in paths[:3]] == ["report.html", "success.png", "success.svg"]
     assert all(path.stat().st_size > 1000 for path in paths)
     text = paths[0].read_text(encoding="utf-8")
     assert f"rotorfault replay '{folder}'" in text.replace("&#39;", "'")
@@ -62,14 +62,14 @@ def test_page_has_the_numbers_and_commands_of_every_cell(page: str, plane: Maps)
     assert len(specs) == 3
     for spec, variant in zip(specs[:2], plane.variants, strict=True):
         heat = spec["data"][0]
-        np.testing.assert_allclose(np.array(heat["z"], dtype=float), variant.survival.T, atol=1e-5)
-        for (i, j), survived in np.ndenumerate(variant.survived):
+        np.testing.assert_allclose(np.array(heat["z"], dtype=float), variant.success_rate.T, atol=1e-5)
+        for (i, j), successes in np.ndenumerate(variant.successes):
             where, said, command, _ = heat["customdata"][j][i]
             assert where == f"loss {LOSS['values'][i]:g}, wind speed {WIND['values'][j]:g} m/s"
-            assert f"survived {survived} of {FIRST}" in said
-            lost = f"--flight {variant.first_lost[i, j]}"
-            none_lost = f"--cell {variant.cell[i, j]} --variant {variant.label}"
-            assert command.endswith(none_lost if survived == FIRST else lost)
+            assert f"success {successes} of {FIRST}" in said
+            failure = f"--flight {variant.first_failure[i, j]}"
+            none = f"--cell {variant.cell[i, j]} --variant {variant.label}"
+            assert command.endswith(none if successes == FIRST else failure)
     table = page[page.index('id="cells"') :]
     assert table.count("<code>rotorfault replay") == 2 * 15
     pair = specs[2]["data"][0]["customdata"][0][1]
@@ -84,11 +84,11 @@ def test_charts_are_what_plotly_takes() -> None:
         found = maps(study, table_of(study, falling))
         cells = charts.variant_cells(found, 0, Path("campaign"))
         if len(found.views) == 1:
-            specs = [charts.survival_lines_chart(found, 0, cells)]
+            specs = [charts.success_lines_chart(found, 0, cells)]
             specs += [charts.difference_lines_chart(found, 0, cells)] if found.pairings else []
         else:
             parts = curves.slices(found)[0]
-            specs = [charts.survival_chart(found, 0, part, cells) for part in parts]
+            specs = [charts.success_chart(found, 0, part, cells) for part in parts]
             specs += [charts.difference_chart(found, 0, part, cells) for part in parts]
             assert len(specs) == 2 * (2 if name == "space" else 1)
         for spec in specs:

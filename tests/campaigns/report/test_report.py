@@ -41,6 +41,6 @@ def test_campaign_makes_its_report(tmp_path: Path) -> None:
     assert done.exit_code == 0
     assert not (folder / "report.html").exists()
     done = CliRunner().invoke(app, ["campaign", "--report-only", "--out", str(folder)], catch_exceptions=False)
-    assert "survival.png" in done.stdout
+    assert "success.png" in done.stdout
     assert (folder / "figures" / "recovery.svg").is_file()
     assert "Campaign tiny" in (folder / "report.html").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Boundaries of survival on maps whose crossings are known."""
+"""Boundaries of success on maps whose crossings are known."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ WIND = np.linspace(0.0, 10.0, 21)  # m/s, an axis that is not of whole numbers
 FLIGHTS = 1000
 
 
-def counts(survival: NDArray[np.float64]) -> NDArray[np.int64]:
-    return np.rint(survival * FLIGHTS).astype(int)
+def counts(rate: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.rint(rate * FLIGHTS).astype(int)
 
 
 def slope(edge: NDArray[np.float64], steepness: float = 0.2) -> NDArray[np.float64]:
@@ -37,7 +37,7 @@ def test_straight_slopes_are_crossed_where_they_cross() -> None:
 
 
 def test_interval_is_where_the_bounds_of_the_cells_cross() -> None:
-    """Bounds that run beside the slope at a known distance, 0.1 of survival or 0.5 m/s."""
+    """Bounds that run beside the slope at a known distance, 0.1 of the success rate or 0.5 m/s."""
     p = slope(np.array([5.0]))
     found = boundary(counts(p), FLIGHTS, WIND, 0.5, interval=Interval(p - 0.1, p + 0.1))
     np.testing.assert_allclose((found.lower[0, 0], found.upper[0, 0]), (4.5, 5.5), atol=1e-9)
@@ -49,7 +49,7 @@ def test_columns_are_rows_of_the_other_axis() -> None:
         np.testing.assert_array_equal(across, along)
 
 
-def test_several_crossings_where_survival_comes_back() -> None:
+def test_several_crossings_where_success_comes_back() -> None:
     """Survival 0.5 + 0.4 cos(2 pi x/8): through one half at 2, 6 and 10, falling, rising, falling."""
     p = 0.5 + 0.4 * np.cos(2.0 * np.pi * np.linspace(0.0, 11.0, 111) / 8.0)
     s = np.vstack([np.rint(p * FLIGHTS), np.full(111, FLIGHTS)]).astype(int)

@@ -36,7 +36,7 @@ PLANS = {
 
 
 def campaign(p: NDArray[np.float64], settings: Refinement, seed: int) -> tuple[Counts, Counts, list[Counts]]:
-    """Fly until the rule says that it is over: survivals, flights, and the rounds."""
+    """Fly until the rule says that it is over: successes, flights, and the rounds."""
     rng, s, n, rounds = np.random.default_rng(seed), np.zeros(p.shape, int), np.zeros(p.shape, int), []
     while (further := further_flights(s, n, settings)).any():
         s, n = s + rng.binomial(further, p), n + further
@@ -45,7 +45,7 @@ def campaign(p: NDArray[np.float64], settings: Refinement, seed: int) -> tuple[C
 
 
 def step_function(columns: int = 20) -> NDArray[np.float64]:
-    """One controller, survival 0.98 to the left of a slanted edge and 0.02 to the right."""
+    """One controller, success rate 0.98 to the left of a slanted edge and 0.02 to the right."""
     row, column = np.mgrid[:10, :columns]
     return np.where(column < 5 + row / 2.0, 0.98, 0.02)[None]
 
@@ -55,7 +55,7 @@ def step_function(columns: int = 20) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("budget", [None, 1_000_000, 400_000])
 def test_intervals_cover_although_results_decide_when_flights_end(budget: int | None) -> None:
-    """2,000 rows of one grid, each with all four survivals: neighbours decide as well, and the budget may end all."""
+    """2,000 rows of one grid, each with all four rates: neighbours decide as well, and the budget may end all."""
     settings = fine(budget=budget)
     p = np.tile(SUCCESS_RATES, (1, 2000, 1))
     s, n, _ = campaign(p, settings, seed=11)
@@ -78,7 +78,7 @@ class Chances(NamedTuple):
 
 def chances(plan: Plan, p: float) -> Chances:
     """Computed from look to look by binomial steps: not the equations by which the plan was made."""
-    going, sound, before = np.ones(1), np.ones(1), 0  # by survivals: not ended; neither ended nor failed
+    going, sound, before = np.ones(1), np.ones(1), 0  # by successes: not ended; neither ended nor failed
     fails = total = flights = held = 0.0
     for k, n in enumerate(plan.looks.tolist()):
         step = binom.pmf(np.arange(n - before + 1), n - before, p)
@@ -119,7 +119,7 @@ def test_the_plain_rule_does_not_cover() -> None:
 
 
 @pytest.mark.parametrize(("p", "most"), [(0.5, 1.2), (0.9, 1.2), (0.99, 1.6)])
-def test_not_many_more_flights_than_if_survival_were_known(p: float, most: float) -> None:
+def test_not_many_more_flights_than_if_the_success_rate_were_known(p: float, most: float) -> None:
     width = 0.1
     for known in range(10, 1000):
         lower, upper = clopper_pearson(np.arange(known + 1), known)
@@ -132,7 +132,7 @@ def test_not_many_more_flights_than_if_survival_were_known(p: float, most: float
 
 
 @pytest.mark.parametrize("name", PLANS)
-def test_plan_is_the_same_with_survivals_and_failures_exchanged(name: str) -> None:
+def test_plan_is_the_same_with_successes_and_failures_exchanged(name: str) -> None:
     plan = sampling_plan(*PLANS[name])
     for k, n in enumerate(plan.looks):
         row = k, slice(n + 1)
@@ -181,7 +181,7 @@ def test_the_same_counts_give_the_same_rounds() -> None:
     assert len(once[2]) == len(again[2])
 
 
-def test_flights_go_where_survival_is_uncertain() -> None:
+def test_flights_go_where_success_is_uncertain() -> None:
     p = np.array([[1.0, 0.999, 0.9, 0.5, 0.1, 0.001, 0.0]])
     _, n, rounds = campaign(p, fine(), seed=1)
     assert (np.diff(n[0, :4]) >= 0).all()
@@ -207,7 +207,7 @@ def test_a_scarce_budget_is_spent_at_the_edge_of_a_step() -> None:
 
 
 def test_neighbours_are_of_one_controller() -> None:
-    """One survives everywhere, the other nowhere: neither has a boundary."""
+    """One succeeds everywhere, the other nowhere: neither has a boundary."""
     s = np.array([[[24, 24], [24, 24]], [[0, 0], [0, 0]]])
     further = further_flights(s, np.full(s.shape, 24), fine(budget=24 * 8 + 24 * 3))
     assert further.ravel().tolist() == [24, 24, 24, 0, 0, 0, 0, 0]  # none before the other, so in order

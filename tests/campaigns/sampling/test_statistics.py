@@ -64,7 +64,7 @@ def test_interval_contains_the_estimate_and_is_a_share(method: Method, data: tup
 
 @pytest.mark.parametrize("method", METHODS)
 @given(data=counts())
-def test_survivals_and_failures_may_change_places(method: Method, data: tuple[int, int]) -> None:
+def test_successes_and_failures_may_change_places(method: Method, data: tuple[int, int]) -> None:
     s, n = data
     lower, upper = method(s, n)
     np.testing.assert_allclose(method(n - s, n), (1.0 - upper, 1.0 - lower), atol=1e-12)
@@ -80,7 +80,7 @@ def test_interval_shrinks_with_the_number_of_flights(method: Method, data: tuple
 
 @pytest.mark.parametrize("method", METHODS)
 @given(n=st.integers(1, 400), level=st.floats(0.5, 0.99))
-def test_bounds_rise_with_survivals_and_part_with_the_level(method: Method, n: int, level: float) -> None:
+def test_bounds_rise_with_successes_and_part_with_the_level(method: Method, n: int, level: float) -> None:
     lower, upper = method(np.arange(n + 1), n, level)
     assert (np.diff(lower) > 0.0).all()
     assert (np.diff(upper) > 0.0).all()

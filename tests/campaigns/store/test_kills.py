@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from campaign_folder import STUDY, everything, filled, needs_posix, results, start, writer
+from campaign_folder import STUDY, everything, filled, missing, needs_posix, results, start, writer
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.store.store import Key, Store
@@ -42,7 +42,7 @@ def test_a_killed_run_is_completed_to_the_same_table(
         told = len(Store.open(folder).done())
     with Store.open(folder, write=True, study=STUDY, digest="program") as store:
         assert {path.suffix for path in (folder / "parts").iterdir()} == {".parquet"}
-        for key in store.missing(blocks):
+        for key in missing(store, blocks):
             store.put(*key, results(*key))
         assert store.finish(blocks).read_bytes() == straight
 

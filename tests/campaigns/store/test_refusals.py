@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaign_folder import BLOCKS, STUDY, everything, needs_posix, results, start, undisturbed
+from campaign_folder import BLOCKS, STUDY, everything, missing, needs_posix, results, start, undisturbed
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.store import identity as identity_module
@@ -49,7 +49,7 @@ def test_other_versions_are_named(folder: Path, monkeypatch: pytest.MonkeyPatch)
     )
     with pytest.raises(InputError, match=words):
         Store.create(folder, STUDY, "program")
-    assert Store.open(folder).missing(BLOCKS) == []  # to be read, any version will do
+    assert missing(Store.open(folder), BLOCKS) == []  # to be read, any version will do
 
 
 def test_foreign_files_are_named_and_left_alone(tmp_path: Path) -> None:

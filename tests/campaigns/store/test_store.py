@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from campaign_folder import BLOCKS, STUDY, everything, filled, part, results, start, undisturbed
+from campaign_folder import BLOCKS, STUDY, everything, filled, missing, part, results, start, undisturbed
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.store import parquet
@@ -18,11 +18,11 @@ from rotorfault.campaigns.store.store import Store
 
 def test_results_come_back_sorted_with_their_block(tmp_path: Path) -> None:
     with start(tmp_path / "new" / "campaign") as store:
-        assert store.missing(BLOCKS) == BLOCKS
+        assert missing(store, BLOCKS) == BLOCKS
         store.put(0, 1, results(0, 1).take([3, 0, *range(4, 20), 2, 1]))
         store.put(0, 0, results(0, 0))
         assert store.done() == {(0, 0), (0, 1)}
-        assert store.missing([(1, 0), (0, 1), (0, 7)]) == [(1, 0), (0, 7)]
+        assert missing(store, [(1, 0), (0, 1), (0, 7)]) == [(1, 0), (0, 7)]
         found = store.get(0, 1)
         assert found.column_names[:3] == ["round", "block", "flight"]
         assert content_digest(found.drop_columns(["round", "block"])) == content_digest(results(0, 1))
@@ -43,7 +43,7 @@ def test_the_order_of_writing_leaves_no_trace(seed: int, tmp_path: Path, folder:
     other, at = tmp_path / "other", rng.randrange(1, len(BLOCKS))
     filled(other, shuffled[:at])
     with Store.open(other, write=True, study=STUDY, digest="program") as store:
-        for key in store.missing(shuffled):
+        for key in missing(store, shuffled):
             rows = rng.sample(range(20), 20)
             store.put(*key, pa.concat_tables([results(*key).take(rows[:7]), results(*key).take(rows[7:])]))
         assert store.finish().read_bytes() == straight

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from figure_checks import check_nothing_covered, check_units, legend_labels, lines_of, made_up
+from made_up_records import save
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Rectangle
 
+from rotorfault.model.block import Context, Nothing
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.plant.wind import PaperWind
 from rotorfault.report import figures as report
@@ -18,7 +20,7 @@ from rotorfault.report import style
 from rotorfault.report.bars import Column, error_figure
 from rotorfault.report.path_figure import _once
 from rotorfault.report.rotor_layout import layout_figure
-from rotorfault.results.dataset import FORMAT, write_netcdf
+from rotorfault.results.flight_data import FORMAT
 from rotorfault.studies.paper import figures
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.runs import Result, Run
@@ -40,9 +42,8 @@ def flight(run: Run, seed: int) -> xr.Dataset:
         data["position_reference"].values[:] = wanted
     if "set-point" not in run.id:
         wind = PaperWind(PaperWind.Settings())
-        data["disturbance"].values[:] = [
-            list(wind.at(t, (), wind.parameters()).acceleration_W) for t in time.tolist()
-        ]
+        numbers = wind.parameters(Context(load_vehicle("paper").vehicle, 1e-3))
+        data["disturbance"].values[:] = [list(wind.at(t, Nothing(), numbers).acceleration_W) for t in time.tolist()]
     return data
 
 
@@ -65,7 +66,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
     for seed, run in enumerate(run for run in main_runs() if run.id in figures.needed()):
         path = folder / f"{run.id}.nc"
         if run.id.endswith("-1ms"):
-            write_netcdf(flight(run, seed), path)
+            save(flight(run, seed), path)
         made[run.id] = Result(run, summary(run, seed), {}, 0.0, path)
     return made
 
@@ -174,7 +175,7 @@ def test_an_error_that_is_missing_is_said() -> None:
 
 def test_a_flight_lost_at_1_ms_is_drawn_to_its_end(results: dict[str, Result], tmp_path: Path) -> None:
     short = results["square-smc-1ms"].data().isel(time=slice(300))
-    write_netcdf(short.assign_attrs(outcome="tumbled", end_time=2.99), tmp_path / "lost.nc")
+    save(short.assign_attrs(outcome="tumbled", end_time=2.99), tmp_path / "lost.nc")
     lost = results["square-smc-1ms"]._replace(path=tmp_path / "lost.nc")
     made = figures.draw_all({i: r for i, r in (results | {"square-smc-1ms": lost}).items() if i.startswith("square")})
     for key in ("fig13", "fig14", "fig15"):

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from made_up_records import LAYOUT, dataset, rows_of
 
-from rotorfault.model.telemetry import SIGNAL_NAMES
-from rotorfault.results.dataset import dataset
 from rotorfault.results.metrics import cost
 from rotorfault.results.outcome import finite_or_none
 from rotorfault.scenario.library import load_scenario
@@ -20,10 +19,10 @@ from rotorfault.studies.paper.measures import chattering, measure
 def made_up(scenario: str = "paper-set-point", duration: float = 20.0, dt: float = 0.01, **put: Any) -> xr.Dataset:
     """A flight at rest in the origin, with the given signals on top."""
     time = np.arange(round(duration / dt)) * dt
-    signals = np.zeros((len(time), len(SIGNAL_NAMES)))
+    signals = np.zeros((len(time), len(LAYOUT)))
     for name, values in put.items():
-        head, _, leaf = name.rpartition("_")
-        signals[:, SIGNAL_NAMES.index(f"{head}.{leaf}")] = values(time) if callable(values) else values
+        head, _, leaf = name.replace("__", ".").rpartition("_")
+        signals[:, rows_of(f"{head}.{leaf}")] = values(time) if callable(values) else values
     settings = {"controller.kind": "smc" if "smc" in scenario else "roismc"}
     tables = load_scenario(scenario.removesuffix("-smc"), settings).as_tables()
     return dataset(signals, time, {"configuration": json.dumps(tables)})
@@ -77,7 +76,7 @@ def test_overshoot_residuals_and_offset() -> None:
 
 
 def test_time_outside_the_layer_and_reaching_of_smc() -> None:
-    data = made_up("paper-set-point-smc", sigma_position_x=lambda t: np.where(t < 2.0, 3.0, 0.0))
+    data = made_up("paper-set-point-smc", controller__sigma_position_x=lambda t: np.where(t < 2.0, 3.0, 0.0))
     found = measure(data)
     settings = load_scenario("paper-set-point", {"controller.kind": "smc"}).controller.settings.law.position
     assert found["outside_layer"]["position"] == pytest.approx(0.1)
@@ -95,8 +94,8 @@ def test_disturbance_of_a_lost_rotor_is_what_its_torque_gives() -> None:
 
 
 def test_cost_readings_change_what_they_say_and_nothing_else() -> None:
-    leaning = {"attitude_x": 0.2, "attitude_demand_x": 0.2}
-    data = made_up(**leaning, torque_demand_x=1.0, virtual_attitude_x=3.0, position_x=0.02)
+    leaning = {"attitude_x": 0.2, "controller__attitude_demand_x": 0.2}
+    data = made_up(**leaning, torque_demand_x=1.0, controller__virtual_attitude_x=3.0, position_x=0.02)
     plain = cost(data)
     span = float(data["time"].values[-1])
     assert plain - cost(data, against="demand") == pytest.approx(0.5 * span * 0.2**2)

@@ -7,6 +7,7 @@ makes a controller of it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple
 
 from rotorfault.autopilot.allocation.available import thrust_available
@@ -51,7 +52,14 @@ class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):
     Signals named ``gain_position``, ``gain_velocity`` (Vec3), ``gain_angle`` and ``gain_rate`` (Mat3) are taken for
     the gains of u = -k1 e - k2 e_dot by the check of sampling; ``virtual_position`` (Vec3, m/s^2) is the commanded
     acceleration less gravity and feed-forward, without which a flight has no cost J.
+
+    Attributes
+    ----------
+    search : mapping
+        Settings that ``rotorfault tune`` may search, by dotted key: lowest, first and highest value, above 0.
     """
+
+    search: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
 
 
 def _inputs(instant: Instant) -> ControlInputs:

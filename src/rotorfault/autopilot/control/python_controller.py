@@ -146,6 +146,6 @@ def as_controller(given: Any) -> Controller[Any, Any]:
     if callable(getattr(given, "update", None)):
         return PythonController(given)
     raise InputError(
-        f"controller {type(given).__name__}: allowed are the name of a registered controller, an object of a class that "
-        "derives from rotorfault.Controller, or an object with update"
+        f"controller {type(given).__name__}: allowed are the name of a registered controller, an object of a class "
+        "that derives from rotorfault.Controller, or an object with update"
     )

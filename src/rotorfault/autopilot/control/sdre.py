@@ -110,8 +110,8 @@ def _inverse_square(e: Scalar, floor: Scalar, cap: Scalar) -> Scalar:
 def position_gains(e: Vec3, parameters: SdreParameters) -> tuple[Vec3, Vec3]:
     """Gains (k1, k2) of u = -k1 e - k2 e_dot per position axis, in 1/s^2 and 1/s.
 
-    `rotorfault.autopilot.control.riccati.position_gain` with the weights (35) put in: with s = 1/|e|, floored and capped,
-    k1 = sqrt(q/r) s^(3/2) and k2 = sqrt(q_rate/r s^2 + 2 k1), which take three roots and one quotient an axis.
+    `rotorfault.autopilot.control.riccati.position_gain` with the weights (35) put in: with s = 1/|e|, floored and
+    capped, k1 = sqrt(q/r) s^(3/2) and k2 = sqrt(q_rate/r s^2 + 2 k1): three roots and one quotient an axis.
     """
     p = parameters
 

@@ -27,7 +27,7 @@ Nothing here sees the plant: a false alarm lands the vehicle too, and a fault th
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, final
+from typing import Annotated, ClassVar, NamedTuple, final
 
 from pydantic import Field
 
@@ -100,6 +100,8 @@ class LandTelemetry(NamedTuple):
 @register("land")
 class Land(Response[LandMemory, LandParameters]):
     """Brake, descend level to the ground at a gentle rate, recognise touch-down, stop the rotors."""
+
+    lands: ClassVar[bool] = True
 
     class Settings(Strict):
         """How to come down, and when it counts as down."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from rotorfault.autopilot.instant import Decision, Instant
 from rotorfault.autopilot.prediction import Expectation
@@ -23,7 +23,15 @@ class ResponseInputs(NamedTuple):
 
 
 class Response(Block[ResponseInputs, Decision, MemoryT, ParametersT]):
-    """Decides what is flown and what is believed once a fault is declared."""
+    """Decides what is flown and what is believed once a fault is declared.
+
+    Attributes
+    ----------
+    lands : bool
+        Whether it may put the vehicle down: its decisions have a stage, and a scenario needs ground for it.
+    """
+
+    lands: ClassVar[bool] = False
 
 
 def _inputs(instant: Instant) -> ResponseInputs:

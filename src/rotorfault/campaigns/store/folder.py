@@ -33,7 +33,7 @@ def require_vacant(folder: Path, campaign: Identity) -> None:
     try:
         names = sorted(path.name for path in folder.iterdir())
         if STUDY in names:
-            difference = read_identity(folder / STUDY).unlike(campaign.study, campaign.program)
+            difference = read_identity(folder / STUDY).unlike(campaign.study, campaign.program, campaign.own)
             same = "holds this campaign already; complete it with --resume, or give another --out"
             raise InputError(f"{folder}: {difference or same}")
         ours = [name for name in names if name in (LOCK, PARTS) or is_leftover(name)]

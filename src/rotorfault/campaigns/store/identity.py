@@ -120,8 +120,8 @@ def read_identity(path: Path) -> Identity:
         if isinstance(file_format, int) and file_format < FORMAT:
             version = content["versions"]["rotorfault"]
             raise InputError(
-                f"{path}: has format {file_format}, of rotorfault {version}, whose tables this version does not read; "
-                "fly the study anew, or use that version"
+                f"{path}: has format {file_format}, of rotorfault {version}, whose tables this version does not "
+                "read; fly the study anew, or use that version"
             )
         campaign = Identity(
             content["study"], content["digests"]["program"], content["versions"], content["own_parts"]

@@ -242,7 +242,7 @@ def gust_effect(windy: Result, calm: Result) -> list[Reading]:
 
 
 def accurate(*results: Result) -> list[Reading]:
-    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.results.metrics`."""
+    """Section 5, end: accurate in spite of wind and faults: settled or tracked, by `rotorfault.loop.scoring`."""
     ends = [f"{r.run.id} {r.summary['outcome']}" for r in results]
     return [Reading("", ", ".join(ends), all(r.summary["outcome"] in ("settled", "tracked") for r in results))]
 

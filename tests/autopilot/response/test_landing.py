@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from rotorfault.autopilot.control.landing import Decided, Land, ResponseInputs
+from rotorfault.autopilot.instant import Decision
+from rotorfault.autopilot.prediction import Expectation
+from rotorfault.autopilot.response.land import Land, LandTelemetry
+from rotorfault.autopilot.response.protocol import ResponseInputs
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.model.signals import Measurement, Reference, healthy
+from rotorfault.maths.rotation import Quat
+from rotorfault.model.block import Context
+from rotorfault.model.signals import Diagnosis, Estimate, Reference, healthy, motion_of
 from rotorfault.model.vehicle import Vehicle
 
 DT = 0.01
@@ -18,24 +24,43 @@ class Pilot:
 
     def __init__(self, vehicle: Vehicle, **settings: float) -> None:
         self.block, self.vehicle = Land(Land.Settings(**settings)), vehicle
-        self.parameters = self.block.parameters()
+        self.parameters = self.block.parameters(Context(vehicle, DT))
         self.at = HOVER
-        self.memory = self.block.initial(self.measured())
         self.weight = vehicle.mass * vehicle.gravity
+        self.memory = self.block.initial(self.inputs(healthy(), 1.0, 0.0), self.parameters)
+        self.recorded = LandTelemetry(0.0, 0.0)
 
-    def measured(self, **seen: Vec3) -> Measurement:
-        return Measurement(self.at.p_W, self.at.v_W, Vec3(0.0, 0.0, self.at.yaw), zeros())._replace(**seen)
+    def estimate(self, **seen: Vec3) -> Estimate:
+        return Estimate(self.at.p_W, self.at.v_W, Quat.about_z(self.at.yaw), zeros())._replace(**seen)
 
-    def step(self, flag: float = 0.0, share: float = 1.0, lift: float = 0.0, **seen: Vec3) -> Decided:
-        """One instant with rotor 3 flagged, believed thrust as share of the weight, unexplained lift in g."""
-        told = healthy()._replace(flagged=PerRotor(0.0, 0.0, flag, 0.0), loss=PerRotor(0.0, 0.0, 0.3 * flag, 0.0))
-        belief = self.block.believed(self.memory, told)
-        inputs = ResponseInputs(
-            self.measured(**seen), HOVER, self.vehicle, belief, share * self.weight, lift * self.vehicle.gravity * DT
+    def inputs(self, told: Diagnosis, share: float, lift: float, **seen: Vec3) -> ResponseInputs:
+        """Believed thrust as share of the weight, on the rotors that no fault hits; unexplained lift in g."""
+        estimate = self.estimate(**seen)
+        now = motion_of(estimate)
+        third = share * self.weight / 3.0
+        expectation = Expectation(
+            now=now,
+            previous=now._replace(v_W=now.v_W - Vec3(0.0, 0.0, lift * self.vehicle.gravity * DT)),
+            mean_thrust=PerRotor.all(0.0),
+            thrust=PerRotor(third, third, 0.0, third),
+            residual_speed=0.0,
+            direct_acceleration_W=zeros(),
+            elapsed=0.0,  # so that the model explains no change of the velocity
         )
-        self.memory, decided = self.block.step(self.memory, inputs, self.parameters, DT)
-        self.at = decided.reference
-        return decided
+        return ResponseInputs(estimate, HOVER, told, expectation, self.vehicle)
+
+    def step(
+        self, flag: float = 0.0, share: float = 1.0, lift: float = 0.0, told: Diagnosis | None = None, **seen: Vec3
+    ) -> Decision:
+        """One instant with rotor 3 flagged, or with another diagnosis."""
+        if told is None:
+            told = healthy()._replace(flagged=PerRotor(0.0, 0.0, flag, 0.0), loss=PerRotor(0.0, 0.0, 0.3 * flag, 0.0))
+        inputs = self.inputs(told, share, lift, **seen)
+        self.memory, decision, recorded = self.block.step(self.memory, inputs, self.parameters, DT)
+        assert isinstance(recorded, LandTelemetry)
+        self.recorded = recorded
+        self.at = decision.reference
+        return decision
 
 
 def test_without_a_flag_nothing_happens(paper_vehicle: Vehicle) -> None:
@@ -43,7 +68,7 @@ def test_without_a_flag_nothing_happens(paper_vehicle: Vehicle) -> None:
     pilot = Pilot(paper_vehicle)
     for _ in range(300):
         decided = pilot.step(flag=0.0, share=0.1, lift=1.0)
-        assert decided == Decided(HOVER, 0.0, 0.0)
+        assert decided == Decision(HOVER, healthy(), 0.0, 0.0)
 
 
 def test_a_flag_must_stand_to_count(paper_vehicle: Vehicle) -> None:
@@ -72,7 +97,7 @@ def test_the_reference_brakes_gently_and_its_derivatives_fit(paper_vehicle: Vehi
     """From 3 m/s: never above the braking limit, position and velocity are integrals, then straight down."""
     pilot = Pilot(paper_vehicle, descent_rate=0.4, braking=2.0, confirmation=0.0)
     pilot.at = HOVER._replace(v_W=Vec3(3.0, -1.0, 0.5), yaw=0.7)
-    begun = pilot.measured()
+    begun = pilot.estimate()
     path = [pilot.step(flag=1.0).reference for _ in range(800)]
     assert path[0].p_W == begun.p_W
     assert path[0].v_W == begun.v_W
@@ -116,20 +141,30 @@ def test_touch_down_stops_the_rotors_for_good(paper_vehicle: Vehicle) -> None:
         assert (decided.stage, decided.relief) == (2.0, 1.0)
         assert decided.reference.p_W == stood
         assert decided.reference.v_W == zeros()
-        sent = pilot.block.relieved(PerRotor.all(3.0), decided, paper_vehicle)
-        assert sent == PerRotor.all(paper_vehicle.thrust_min)
+
+
+def test_rotors_that_are_believed_dead_carry_nothing(paper_vehicle: Vehicle) -> None:
+    """Thrust enough of sound rotors, that is, and none of those that are believed."""
+    pilot = descending(paper_vehicle)
+    dead = healthy()._replace(loss=PerRotor(1.0, 1.0, 0.3, 1.0), flagged=PerRotor.all(1.0))
+    stages = [pilot.step(told=dead, share=1.0, v_W=zeros()).stage for _ in range(31)]
+    assert stages[28:] == [1.0, 2.0, 2.0]
 
 
 def test_contact_takes_thrust_back_and_holds_the_belief_until_it_is_over(paper_vehicle: Vehicle) -> None:
     pilot = descending(paper_vehicle)
     for _ in range(20):
-        pilot.step(flag=1.0, lift=0.5)
-    assert 0.8 < pilot.memory.relief < 1.0
+        decided = pilot.step(flag=1.0, lift=0.5)
+    assert 0.8 < decided.relief < 1.0
+    assert pilot.recorded.relief == decided.relief
+    assert pilot.recorded.lift == pytest.approx(0.5 * paper_vehicle.gravity, rel=1e-4)
     wrong = healthy()._replace(loss=PerRotor.all(0.9), flagged=PerRotor.all(1.0))
-    assert pilot.block.believed(pilot.memory, wrong).loss == PerRotor(0.0, 0.0, 0.3, 0.0)
+    held = pilot.step(told=wrong, lift=0.5).diagnosis
+    assert held.loss == PerRotor(0.0, 0.0, 0.3, 0.0)
+    assert held.flagged == PerRotor(0.0, 0.0, 1.0, 0.0)
     for _ in range(40):
-        pilot.step(flag=1.0)
-    assert pilot.memory.relief < 0.01, "it was a gust"
-    assert pilot.block.believed(pilot.memory, wrong) == wrong
+        decided = pilot.step(flag=1.0)
+    assert decided.relief < 0.01, "it was a gust"
+    assert pilot.step(told=wrong).diagnosis == wrong
     for _ in range(40):
         assert pilot.step(flag=1.0, lift=-0.5).relief < 0.01, "a loss pulls down"

@@ -1,0 +1,5 @@
+"""``python -m rotorfault``: the command line."""
+
+from rotorfault.cli.main import main
+
+main()
