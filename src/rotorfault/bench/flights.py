@@ -10,7 +10,6 @@ whole engine call: from parameters to scores. Only steps of flights that still f
 from __future__ import annotations
 
 import json
-import resource
 import statistics
 import subprocess
 import sys
@@ -164,6 +163,14 @@ def alone(size: int) -> None:
     start = time.perf_counter()
     fly_many(flown, columns)
     seconds = time.perf_counter() - start
+    print(json.dumps({"us_per_flight": 1e6 * seconds / size, "peak_memory_MB": _peak_memory()}))
+
+
+def _peak_memory() -> float | None:
+    """In MB; None on Windows, which has no such count."""
+    try:
+        import resource
+    except ImportError:
+        return None
     # In kilobytes, but on macOS in bytes.
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0)
-    print(json.dumps({"us_per_flight": 1e6 * seconds / size, "peak_memory_MB": most / 1e6}))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1.0 if sys.platform == "darwin" else 1024.0) / 1e6

@@ -160,11 +160,15 @@ def _flights(results: dict[str, Any]) -> str:
     )
 
 
+def _megabytes(peak: float | None) -> str:
+    return "memory not known" if peak is None else f"{peak:.0f} MB"
+
+
 def _limits(results: dict[str, Any]) -> str:
     o, noise = results["operations"], results["noise"]
     kinds = ", ".join(f"{count} {kind}" for kind, count in list(o["by_sort"].items())[:9])
     scaling = ", ".join(
-        f"{int(size):,}: {part['us_per_flight']:.0f} us, {part['peak_memory_MB']:.0f} MB"
+        f"{int(size):,}: {part['us_per_flight']:.0f} us, {_megabytes(part['peak_memory_MB'])}"
         for size, part in results["scaling"].items()
     )
     return (

@@ -111,7 +111,9 @@ class Variant(Strict):
 class Study(Strict):
     """Everything that defines a campaign."""
 
-    name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$", description="short name, also of the folder")
+    name: str = Field(
+        min_length=1, pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$", description="short name, also of the folder"
+    )
     description: str = Field(default="", description="one line")
     scenario: str | dict[str, Any] = Field(
         description="what is flown: name of a scenario, a TOML file, or the tables of one"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,7 +60,8 @@ def fly(
     if preset is not None:
         settings = {"controller.preset": preset, **settings}
     checked = prepare(scenario, controller, settings, seed, allow_code)
-    folder = out or Path("results") / f"{checked.name}-{_name(checked)}".replace("/", "_")
+    # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
+    folder = out or Path("results") / re.sub(r"[^\w.-]+", "_", f"{checked.name}-{_name(checked)}")
     output_folder(folder)
     _warn(checked)
     finish(_flown(checked, engine), folder, figures)

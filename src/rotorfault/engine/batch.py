@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.noise import Noise, Stream
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, leaf_names
 
-Array = NDArray[np.float64]
 CHUNK = 500  # steps between two looks at progress, noise and flights that are over
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from rotorfault.base.progress import Busy
 from rotorfault.engine import cache, native
-from rotorfault.engine.batch import Array, Batch
+from rotorfault.engine.batch import Batch
 from rotorfault.engine.cache import Compiled
 from rotorfault.engine.program import Program, program, trace
+from rotorfault.maths.arrays import Array
 
 _FUNCTIONS = (("prepare", 2, 1), ("fly", 4, 2))
 _NOTHING = np.zeros(1)

@@ -15,11 +15,12 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
-from rotorfault.engine.batch import Array, Batch, columns
+from rotorfault.engine.batch import Batch, columns
 from rotorfault.engine.noise import Stream, normals
 from rotorfault.engine.program import same_code
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
 from rotorfault.loop.scores import scoring_parameters
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.records import flatten, record_type, unflatten
 from rotorfault.model.block import Context, Record

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.progress import Bar
 from rotorfault.engine import default_engine, load_engine
-from rotorfault.engine.batch import Array, Batch
+from rotorfault.engine.batch import Batch
 from rotorfault.flight.assembly import Group, assemble_group, build
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly, prepare
 from rotorfault.flight.sweep import checked_columns, groups_of
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
 from rotorfault.model.telemetry import Layout
 from rotorfault.results.score_table import ScoreTable, score_table

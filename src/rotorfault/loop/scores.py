@@ -16,13 +16,13 @@ from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, maximum
 
 SETTLED = 0.02  # of the step: the two-percent criterion
-TRACKED = 0.05  # of the span
-ERROR_FLOOR = 0.01  # m, in the cost's Q and R
-FAR = 1e4  # m
+TRACKED = 0.05  # of the span; two and a half times the settling band, for a reference that moves: our choice
+ERROR_FLOOR = 0.01  # m, in the cost's Q and R, which the paper leaves infinite at e = 0 (docs/paper.md)
+FAR = 1e4  # m; beyond any scenario: what diverges
 SPEED_MAX = 1.0  # m/s, downwards at touch-down: as after a fall from 5 cm
-SLIDE_MAX = 0.5  # m/s, horizontal
+SLIDE_MAX = 0.5  # m/s, horizontal; half of the vertical, for feet catch sideways
 TILT_MAX = math.radians(15.0)  # at touch-down; beyond it a vehicle of usual proportions tips over its feet
-REST = 0.5  # s that a landed vehicle must stand with rotors stopped; then the flight is over
+REST = 0.5  # s that a landed vehicle must stand with rotors stopped, longer than a bounce; then the flight is over
 AT_LIMIT = 1e-9  # of the largest command: below it a difference from a limit is rounding
 # m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that
 # has recovered is not on the verge of being degraded.

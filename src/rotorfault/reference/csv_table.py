@@ -7,11 +7,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError, unknown
-
-Array = NDArray[np.float64]
+from rotorfault.maths.arrays import Array
 
 REQUIRED = ("t", "x", "y", "z")
 OPTIONAL = ("yaw", "vx", "vy", "vz", "ax", "ay", "az", "yaw_rate")

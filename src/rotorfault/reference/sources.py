@@ -19,12 +19,12 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NamedTuple, TypeAlias, cast, final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_serializer, model_validator
 
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, read_text, refusal
 from rotorfault.base.errors import InputError
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.model.block import Block, Nothing, Record
@@ -32,7 +32,6 @@ from rotorfault.model.signals import Reference
 from rotorfault.model.slot import Slot, register
 from rotorfault.reference.csv_table import read_table
 
-Array: TypeAlias = NDArray[np.float64]
 Triple: TypeAlias = tuple[float, float, float]
 PositiveTriple: TypeAlias = tuple[
     Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]

@@ -10,13 +10,11 @@ from typing import Any, NamedTuple, Protocol, Self, final
 
 import numpy as np
 
-from rotorfault.engine.batch import Array
+from rotorfault.maths.arrays import ANGLES, AXES, Array
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.telemetry import RPY, Layout
 
-AXES = ["x", "y", "z"]
-ANGLES = ["roll", "pitch", "yaw"]
 COMPONENTS = ["w", "x", "y", "z"]
 FORMAT = "rotorfault-flight-2"
 

@@ -28,15 +28,14 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.engine.batch import Array, Batch, columns
+from rotorfault.engine.batch import Batch, columns
 from rotorfault.loop.closed_loop import LoopState
 from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, Scores, ScoringParameters
 from rotorfault.loop.scoring import Scoring
+from rotorfault.maths.arrays import ANGLES, AXES, Array
 from rotorfault.maths.records import unflatten
 from rotorfault.model.telemetry import Signal
 
-AXES = ("x", "y", "z")
-ANGLES = ("roll", "pitch", "yaw")
 GIVEN_UP = ("tilt", "thrust", "yaw")
 ROTORS = ("1", "2", "3", "4")
 LANDING = (

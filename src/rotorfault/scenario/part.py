@@ -211,7 +211,8 @@ def _with_preset(
     if preset in known:
         return preset, _merged(known[preset], settings)
     # A table that holds every setting needs no preset to be looked up: its name says where they come from.
-    complete = set(settings) >= set(factory.Settings.model_fields)
+    fields = set(factory.Settings.model_fields)
+    complete = bool(fields) and set(settings) >= fields
     if preset not in ("", NO_PRESET) and not complete:
         raise refusal("preset", unknown("preset", preset, [*known, NO_PRESET]))
     return preset, settings

@@ -15,7 +15,9 @@ from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.motion import effect_of
 from rotorfault.model.vehicle import Vehicle
 
-HOVER_RESERVE = 1.2  # of the weight: thrust for which yaw is given up where it cannot be had in balance
+# Of the weight: thrust for which yaw is given up where it cannot be had in balance. Our choice: a fifth above the
+# weight stops a fall; more would give yaw up sooner, less could not climb back.
+HOVER_RESERVE = 1.2
 
 
 def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:

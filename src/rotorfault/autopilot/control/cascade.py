@@ -52,22 +52,29 @@ from rotorfault.model.vehicle import Vehicle
 class CascadeSettings(Strict):
     """How virtual accelerations become thrust and attitude demand."""
 
+    # Defaults are our choice; each says what it trades. Presets hold what a search found.
+    # 52 degrees: at a thrust-to-weight ratio of 2 the vertical part of the thrust still exceeds the weight.
     tilt_max: float = Field(default=0.9, gt=0.0, lt=1.5, description="largest demanded tilt [rad]")
+    # The rest is kept for attitude when position asks for everything.
     thrust_share: float = Field(
         default=0.95,
         gt=0.0,
         le=1.0,
         description="share of the thrust that the believed rotors have in balance, for position control",
     )
+    # Less falls faster and leaves tilt less authority.
     fall_share: float = Field(
         default=0.3, gt=0.0, lt=1.0, description="least vertical specific force demanded, as a share of gravity"
     )
+    # 73 degrees, beyond any demanded tilt: acts only on a vehicle that tumbles.
     cos_min: float = Field(
         default=0.3, gt=0.0, le=1.0, description="thrust rises as 1/cos(tilt) down to this cosine, no further"
     )
+    # Half the bandwidth of the paper's rotors; a faster filter saturates them.
     filter_bandwidth: float = Field(
         default=25.0, gt=0.0, description="double pole of the attitude command filter [rad/s]"
     )
+    # A third of the filter's; with more, the delay of the attitude looks like wind to a sliding surface.
     horizontal_lag: float = Field(
         default=8.0, gt=0.0, description="bandwidth with which horizontal acceleration is believed to come [rad/s]"
     )

@@ -48,7 +48,9 @@ from rotorfault.maths.scalar import (
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.vehicle import Vehicle
 
-SMALL_THRUST = 0.05  # of F_max: below it a thrust is no measure for a loss
+# Of F_max: below it a thrust is no measure for a loss. Our choice: an error of 1 % of F_max then reads as a loss of
+# 0.2 at most.
+SMALL_THRUST = 0.05
 
 
 class DecisionSettings(Strict):

@@ -51,7 +51,10 @@ from rotorfault.model.slot import register
 from rotorfault.model.vehicle import wrench_of
 
 Form = Literal["injected", "linear", "lag_states"]
-LEAST_COSINE = 0.2  # below it the vertical balance hardly sees the thrust; the observer must not divide by it
+# Of tilt, 78 degrees: below it the vertical balance hardly sees the thrust. Our choice: an innovation is amplified
+# fivefold at most.
+LEAST_COSINE = 0.2
+FASTEST_POLE = 30.0  # per sampling period: exp(-30) = 1e-13 is zero beside 1 but for rounding
 
 
 class LuenbergerSettings(Strict):
@@ -140,10 +143,10 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         """
         vehicle, period = context
         fastest = max(self.settings.poles)
-        if fastest * period > 30.0:
+        if fastest * period > FASTEST_POLE:
             raise InputError(
                 f"diagnosis.poles: {fastest:g} rad/s at a sampling period of {period:g} s; allowed: up to "
-                f"{30.0 / period:g} rad/s"
+                f"{FASTEST_POLE / period:g} rad/s"
             )
         w = vehicle.rotor_bandwidth
         decay = math.exp(-w * period) if self.settings.form == "lag_states" else 1.0
