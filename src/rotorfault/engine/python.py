@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from rotorfault.engine.batch import (
-    Array,
     Batch,
     Recording,
     Records,
@@ -18,6 +17,7 @@ from rotorfault.engine.batch import (
     recorded,
 )
 from rotorfault.loop.closed_loop import LoopState
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Record
 

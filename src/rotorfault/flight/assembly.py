@@ -237,6 +237,23 @@ def initial_state(
     return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
 
 
+def begins_alike(loop: ClosedLoop, scenario: Scenario, batch: Batch) -> bool:
+    """Whether a flight begins the same in another loop, which knows its numbers from the parameters alone.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+        With the same parts, of other settings.
+    scenario : Scenario
+        Of the flight.
+    batch : Batch
+        Of the flight.
+    """
+    state = initial_state(loop, start_of(scenario), batch.reference, batch.seeds, batch.parameters)
+    one, other = (np.array(flatten(record), dtype=float) for record in (state, batch.state))
+    return np.array_equal(one, other, equal_nan=True)
+
+
 @final
 class _Assembly:
     """Builds the batch of some flights of a group.

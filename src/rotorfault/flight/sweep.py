@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_own
 from rotorfault.engine.program import same_code
-from rotorfault.flight.assembly import Group, assemble, overridden
+from rotorfault.flight.assembly import Group, assemble, begins_alike, overridden
 from rotorfault.scenario.overrides import override
 from rotorfault.scenario.part import Part
 from rotorfault.scenario.scenario import Scenario
@@ -106,7 +106,8 @@ def _is_numeric(scenario: Scenario, tables: dict[str, Any], key: str, column: ND
     """Whether a key of the scenario holds a float that may be one of the batch's numbers.
 
     Of parts from outside the package nobody knows whether they keep the rule that every float is a parameter
-    (`rotorfault.check_block` tells): there, loops with the least and the largest value must have the same code.
+    (`rotorfault.check_block` tells): there, loops with the least and the largest value must have the same code, and
+    begin alike.
     """
     first, _, rest = key.partition(".")
     if not np.issubdtype(column.dtype, np.number) or not isinstance(_value_at(tables, key), float):
@@ -122,8 +123,9 @@ def _is_numeric(scenario: Scenario, tables: dict[str, Any], key: str, column: ND
         return False
     if is_own(type(part.make()).__module__):
         return True
-    ends = (overridden(scenario, {key: float(end)}, "vary") for end in (column.min(), column.max()))
-    return same_code(*(assemble(one) for one in ends))
+    least, most = (overridden(scenario, {key: float(end)}, "vary") for end in (column.min(), column.max()))
+    one, other = assemble(least), assemble(most)
+    return same_code(one, other) and begins_alike(one.loop, most, other)
 
 
 def _value_at(tables: dict[str, Any], key: str) -> Any:

@@ -104,8 +104,9 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
     parameters: ScoringParameters = numbers.scoring
     scoring, dt = batch.loop.scoring, np.asarray(numbers.period, dtype=float)
     onsets = batch.loop.onsets(numbers.parts)
-    lasted = (scores.over == 0.0) & (flown.steps >= batch.steps)
-    outcome = np.where((scores.over > 0.0) | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
+    over, steps = np.asarray(scores.over) > 0.0, np.asarray(flown.steps)
+    lasted = ~over & (steps >= batch.steps)
+    outcome = np.where(over | lasted, _outcomes(batch, scores, parameters), INTERRUPTED)
     survived = np.isin(outcome, SURVIVED)
     end: Array = np.asarray(scores.end, dtype=float)
     end_time: Array = np.where(scores.over > 0.0, end, flown.steps) * dt
