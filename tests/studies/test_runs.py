@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from gates import needs_simd
 
 import rotorfault as rf
-from rotorfault.engine import have_simd
 from rotorfault.studies.paper import study
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, run_of
 from rotorfault.studies.pool import fly_missing
@@ -122,11 +122,10 @@ def test_one_case_and_controller_alone() -> None:
         study.selected(None, "sdre")
 
 
+@needs_simd
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("case", list(CASES))
 def test_every_case_survives_with_both_faults_at_1_ms(case: str, controller: str, tmp_path: Path) -> None:
-    if not have_simd():
-        pytest.skip("needs llvmlite: up to 120,000 steps take minutes without it")
     summary = RunStore(tmp_path).get(run_of(case, controller)).summary
     assert summary["survived"] is True
     assert [hit["rotor"] for hit in summary["detections"]] == [1, 3]
