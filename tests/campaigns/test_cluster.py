@@ -10,17 +10,17 @@ from typing import Any
 
 import pytest
 from campaign_studies import TINY
+from gates import needs_simd
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.executors import InProcess, executor_of
 from rotorfault.base.resumable import Executor
 from rotorfault.campaigns import run
 from rotorfault.campaigns.study import Study, study_from
-from rotorfault.engine import have_simd
 
 distributed = pytest.importorskip("distributed")
 dask_executor = pytest.importorskip("rotorfault.base.dask_executor")
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
+pytestmark = needs_simd
 
 
 @pytest.fixture(scope="module")

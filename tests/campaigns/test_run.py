@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from campaign_studies import TINY
+from gates import needs_simd
+from places import SOURCE
 
 import rotorfault
 from rotorfault.autopilot.control import CONTROLLER
@@ -28,11 +30,9 @@ from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
 from rotorfault.campaigns.study import Study, changed, load_study, study_from
-from rotorfault.engine import have_simd
 from rotorfault.scenario.library import load_scenario
 
-pytestmark = pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
-SOURCE = str(Path(rotorfault.__file__).parents[1])
+pytestmark = needs_simd
 
 
 def tiny(**tables: Any) -> Study:
@@ -129,7 +129,7 @@ def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, und
         "print('complete', flush=True)\n"
     )
     folder, draw = tmp_path / "campaign", random.Random(3)
-    environment = {**os.environ, "PYTHONPATH": SOURCE}
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
     for _ in range(3):
         child = subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=subprocess.PIPE)
         assert child.stdout is not None

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import typer.main
+from markdown import FENCE, anchors
 from places import DOCS, ROOT, SOURCE
 
 import rotorfault as rf
@@ -34,7 +35,6 @@ from rotorfault.scenario.slots import SLOTS
 
 PAGES = [*sorted((DOCS).rglob("*.md")), ROOT / "README.md"]
 TEXT = {path: path.read_text(encoding="utf-8") for path in PAGES}
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGE_OF = {
     "reference": "scenarios.md",
     "wind": "scenarios.md",
@@ -84,12 +84,6 @@ def blocks(*languages: str) -> Iterator[tuple[Path, str]]:
 
 def ticked(path: Path) -> list[str]:
     return re.findall(r"`([^`\n]+)`", prose(path))
-
-
-def anchors(path: Path) -> set[str]:
-    """The anchors of a page's headings, as GitHub makes them."""
-    headings = re.findall(r"^#+ (.+)$", FENCE.sub("", path.read_text(encoding="utf-8")), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
 
 
 def section(page: str, kind: str, table: str) -> str:

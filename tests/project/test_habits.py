@@ -5,16 +5,15 @@ from __future__ import annotations
 import re
 import shlex
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from test_docs import anchors
+from markdown import anchors
+from places import ROOT
 
 import rotorfault
 
-ROOT = Path(__file__).parents[1]
 PAGES = ("CONTRIBUTING.md", "SECURITY.md", ".github/PULL_REQUEST_TEMPLATE.md")
 
 

@@ -336,9 +336,3 @@ def test_one_instant_is_enough() -> None:
     assert summary["position_mse"] == {"x": None, "y": None, "z": None}
     assert summary["cost"] == 0.0
     assert json.dumps(summary, allow_nan=False)
-
-
-def test_numbers_that_json_cannot_hold_become_none() -> None:
-    numbers = {"a": math.nan, "b": [1.0, math.inf, {"c": -math.inf, "d": "text", "e": 3}], "f": True, "g": None}
-    expected = {"a": None, "b": [1.0, None, {"c": None, "d": "text", "e": 3}], "f": True, "g": None}
-    assert finite_or_none(numbers) == expected

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rotorfault.autopilot.control import CONTROLLER, ControlInputs, Controller, ControlOutput
 from rotorfault.autopilot.control.cascade import CascadeMemory, CascadeParameters
+from rotorfault.engine import have_simd
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
@@ -175,6 +176,16 @@ def test_in_free_fall_it_feels_nothing() -> None:
     )
     assert np.abs(signals["specific_force"][-1]).max() < 1e-12
     assert signals["velocity"][-1, 2] < -9.0
+
+
+def test_standing_on_the_ground_it_feels_its_weight_again() -> None:
+    """Rotors stopped: the feet carry it, and no free fall is felt."""
+    tables = {"ground": -0.05, "on_fault": "land", "duration": 1.7, "step": 0.001, "wind": "none"}
+    hover = {"reference": {"kind": "set_point", "position": [0.0, 0.0, 0.0]}}
+    signals = flown(Witness(), "simd" if have_simd() else "python", **tables, **hover)
+    assert signals["landing_stage"][-1] == 2.0
+    assert np.abs(signals["thrust"][-1]).max() < 1e-6
+    np.testing.assert_allclose(signals["controller.force"][-1], [0.0, 0.0, 9.81], atol=2e-2)
 
 
 @pytest.mark.parametrize("plant", ["rigid_body", "paper_model"])

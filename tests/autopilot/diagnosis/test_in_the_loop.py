@@ -164,7 +164,7 @@ def test_who_is_no_oracle_is_not_told_whatever_methods_it_has() -> None:
 
 
 def test_an_autopilot_without_an_oracle_ignores_a_truth_that_is_pressed_upon_it() -> None:
-    batch = assemble(scenario(diagnosis="luenberger"))
+    batch = assemble(scenario(), {DIAGNOSIS: Impostor()})
     loop, state, numbers = batch.loop, batch.state, batch.parameters
     assert loop.autopilot.oracle is None
     readings = Readings(*(Reading(value) for value in state.plant.body), Reading(zeros()))
@@ -176,6 +176,20 @@ def test_an_autopilot_without_an_oracle_ignores_a_truth_that_is_pressed_upon_it(
         return flatten((memory, command, report.instant.diagnosis, report.allocation))
 
     assert step(PerRotor.all(0.9)) == step(None)
+
+
+@pytest.mark.parametrize("kind", ["luenberger", "off", "oracle", "delayed"])
+def test_the_loop_hands_the_truth_out_to_oracles_alone(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    step, handed = autopilot.Autopilot.step, []
+
+    def watched(self: Any, *arguments: Any) -> Any:
+        handed.append(arguments[-1])
+        return step(self, *arguments)
+
+    monkeypatch.setattr(autopilot.Autopilot, "step", watched)
+    closed_loop(diagnosis=kind, duration=0.02)
+    assert len(handed) == 20
+    assert {truth is None for truth in handed} == {kind in ("luenberger", "off")}
 
 
 def test_an_oracle_without_the_truth_says_so() -> None:

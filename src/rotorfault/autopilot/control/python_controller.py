@@ -2,7 +2,7 @@
 
 The object has one method, called at every sampling instant with floats:
 
-    def update(self, time, measurement, reference, vehicle): return Wrench(thrust, Vec3(roll, pitch, yaw))
+    def update(self, time, estimate, reference, vehicle): return Wrench(thrust, Vec3(roll, pitch, yaw))
 
 It may keep whatever state it likes and use whatever library it likes, and so runs in the python engine only. A
 controller that shall run in every engine is a block in the scalar style instead: see
