@@ -255,6 +255,16 @@ def test_the_estimate_is_read_150_ms_after_the_onset() -> None:
     assert hit["loss_error"] == pytest.approx(0.03)
 
 
+def test_recovery_is_counted_from_the_first_onset_to_the_last_time_far_off() -> None:
+    """Thrown off by half a metre from 2.5 s to 4.0 s; another fault at 3 s counts from the first."""
+    away = np.outer((TIME > 2.45) & (TIME < 3.95), [0.0, 0.5, 0.0])
+    hit = faults((1, 2.0), (3, 3.0))
+    assert scored(tables=hit, position=away)["recovery_time"] == pytest.approx(2.0)
+    assert scored(tables=hit, position=0.4 * away)["recovery_time"] == 0.0
+    assert math.isnan(scored(tables=hit, position=np.outer(TIME > 2.45, [0.0, 0.5, 0.0]))["recovery_time"])
+    assert math.isnan(scored(position=away)["recovery_time"]), "without a fault"
+
+
 def test_a_flight_that_ends_before_the_estimate_is_read() -> None:
     (hit,) = summarised(tables=faults((4, 10.0)), loss_true=at(10.0, 4, 0.5))["detections"]
     assert hit["rotor"] == 4

@@ -82,7 +82,7 @@ class Bare(rf.Controller):
     ("search_", "message"),
     [
         ("{}", r"does not say what to search; its class needs"),
-        ("{'k': (1.0, 0.5, 2.0)}", r"search\['k'\] is \(1.0, 0.5, 2.0\); allowed: lowest, start, highest"),
+        ("{'k': (1.0, 0.5, 2.0)}", r"search\['k'\] is \(1.0, 0.5, 2.0\); allowed: lowest, first and highest value"),
         ("{'k': (0.0, 0.5, 2.0)}", "above 0 and in order"),
         ("{'k': (1.0, 1.0, 1.0)}", "above 0 and in order"),
     ],
