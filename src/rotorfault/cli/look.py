@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.foreign import is_place
 from rotorfault.cli.app import AllowCode, app
 
 
@@ -55,6 +54,7 @@ def check(
 
     Example: rotorfault check examples/controller.py:PdController
     """
+    from rotorfault.base.foreign import is_place
     from rotorfault.cli import catalogue
 
     if is_place(file) and ".py:" in file:
