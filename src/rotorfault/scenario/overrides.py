@@ -46,6 +46,9 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             if here is tables and part == "vehicle" and isinstance(inner, str):
                 # A vehicle's name stands for its file: laid out here, so that single numbers of it can be set.
                 inner = here[part] = load_vehicle(inner).model_dump(mode="json")
+            if here is tables and part in SLOTS and (shorthand := SLOTS[part].shorthand) is not None:
+                # What stands for a table, such as the ground's height alone, is laid out likewise.
+                inner = here[part] = shorthand(inner)
             if (isinstance(inner, str) and depth == len(path) - 1) or inner is None:
                 # A bare name stands for a table with that kind.
                 inner = here[part] = {} if inner is None else {"kind": inner}
