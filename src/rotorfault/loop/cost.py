@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from rotorfault.loop.scores import ERROR_FLOOR
 from rotorfault.maths.geometry import Vec3
@@ -21,27 +20,38 @@ def attitude_error(attitude: Quat, yaw_reference: Scalar) -> Vec3:
     return attitude.turned(-yaw_reference).rotation_vector()
 
 
-def cost_rate(signals: Any, error: Vec3, turn: Vec3) -> Scalar:
+def cost_rate(
+    error: Vec3,
+    slope: Vec3,
+    turn: Vec3,
+    rates: Vec3,
+    acceleration: Vec3,
+    torque: Vec3,
+    floor: float = ERROR_FLOOR,
+    floor_r: float = ERROR_FLOOR,
+) -> Scalar:
     """e'Qe + u'Ru of (19) with the printed weights (35).
 
     Parameters
     ----------
-    signals : record
-        Of a controller with the signal ``virtual_position``.
-    error : Vec3, m
-        Position less reference.
-    turn : Vec3, rad
-        Attitude error.
+    error, slope : Vec3, m and m/s
+        Position and velocity less those of the reference.
+    turn, rates : Vec3, rad and rad/s
+        Attitude error, and the body's rates.
+    acceleration : Vec3, m/s^2
+        Virtual input of the position axes.
+    torque : Vec3, N m
+        Input of the attitude axes, as it was given.
+    floor, floor_r : float, m
+        Floor of |e| in Q and in R, which the paper leaves without one.
     """
-    slope = signals.velocity - signals.velocity_reference
-    torque = signals.torque_demand - signals.torque_unallocated
-    size = error.map(lambda e: maximum(absolute(e), ERROR_FLOOR))
     # e^2 / max(|e|, floor), without the division.
     share = each(
-        lambda e, most: select(less_equal(absolute(e), ERROR_FLOOR), e * e * (1.0 / ERROR_FLOOR), most), error, size
+        lambda e, most: select(less_equal(absolute(e), floor), e * e * (1.0 / floor), most),
+        error,
+        error.map(lambda e: maximum(absolute(e), floor)),
     )
-    push = size.times(signals.parts.controller.virtual_position)
-    rates = signals.body_rates
+    push = error.map(lambda e: maximum(absolute(e), floor_r)).times(acceleration)
     state = turn.dot(turn) + rates.dot(rates) + Q_POSITION * share.sum() + Q_VELOCITY * slope.dot(slope)
     return state + R_TORQUE * torque.dot(torque) + push.dot(Vec3.of(R_POSITION).times(push))
 

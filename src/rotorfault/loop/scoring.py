@@ -232,7 +232,7 @@ class Scoring:
             both(rises, negated(begun[rotor])) if rotor in begun else rises
             for rotor, rises in enumerate(raised, start=1)
         ]
-        rate = cost_rate(signals, error, turn) if self.has_cost else 0.0
+        rate = self._cost_rate(signals, error, turn) if self.has_cost else 0.0
         struck = any_of(begun.values())
         return scores._replace(
             seen=scores.seen + 1.0,
@@ -292,6 +292,18 @@ class Scoring:
             loss_true=select(d.read, d.loss_true, true),
             loss_believed=select(d.read, d.loss_believed, believed),
             loss_error=maximum(d.loss_error, select(reading, absolute(believed - true), 0.0)),
+        )
+
+    @staticmethod
+    def _cost_rate(signals: Any, error: Vec3, turn: Vec3) -> Scalar:
+        """The cost's integrand at this instant."""
+        return cost_rate(
+            error,
+            signals.velocity - signals.velocity_reference,
+            turn,
+            signals.body_rates,
+            signals.parts.controller.virtual_position,
+            signals.torque_demand - signals.torque_unallocated,
         )
 
     @staticmethod

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.loop.cost import Q_POSITION, Q_VELOCITY, R_POSITION, R_TORQUE
+from rotorfault.loop.cost import cost_rate
 from rotorfault.loop.scores import ERROR_FLOOR
+from rotorfault.maths.geometry import Vec3
 from rotorfault.results.flight_data import Signals
 
 
@@ -59,17 +60,18 @@ def cost(
     floor, floor_r : float
         Floor of |e| in Q and in R, in m.
     """
-    e = data["position"].values - data["position_reference"].values
-    e_dot = data["velocity"].values - data["velocity_reference"].values
-    angle, rate = attitude_error(data, against), data["body_rates"].values
-    size, size_r = (np.maximum(np.abs(e), least) for least in (floor, floor_r))
-    u_position = data["controller.virtual_position"].values
-    u_attitude = data["torque_demand"].values - data["torque_unallocated"].values
-    if inputs == "virtual":
-        u_attitude = data["controller.virtual_attitude"].values
-    state = np.sum(angle**2 + rate**2 + Q_POSITION / size * e**2 + Q_VELOCITY * e_dot**2, axis=1)
-    effort = np.sum(R_TORQUE * u_attitude**2 + np.array(R_POSITION) * size_r**2 * u_position**2, axis=1)
-    return float(0.5 * np.trapezoid(state + effort, data["time"].values))
+    torque = data["torque_demand"].values - data["torque_unallocated"].values
+    vectors = (
+        data["position"].values - data["position_reference"].values,
+        data["velocity"].values - data["velocity_reference"].values,
+        attitude_error(data, against),
+        data["body_rates"].values,
+        data["controller.virtual_position"].values,
+        data["controller.virtual_attitude"].values if inputs == "virtual" else torque,
+    )
+    error, slope, turn, rates, acceleration, effort = (Vec3(*columns.T) for columns in vectors)
+    rate = cost_rate(error, slope, turn, rates, acceleration, effort, floor, floor_r)
+    return float(0.5 * np.trapezoid(rate, data["time"].values))
 
 
 def lyapunov_violations(data: Signals) -> float | None:
