@@ -293,12 +293,9 @@ def sources_of(scenario: Scenario) -> dict[str, str]:
     ----------
     scenario : Scenario
     """
-    digests = {}
+    digests: dict[str, str] = {}
     for _, part in scenario.parts():
-        if part.source:
-            digests[part.kind] = part.source
-        for place in part.settings.code():
-            digests[place] = foreign.source_digest(foreign.load(place, part.slot.registry.sort))
+        digests |= part.sources
     return digests
 
 

@@ -76,11 +76,16 @@ class Part(Generic[B]):
     @property
     def source(self) -> str:
         """Digest of the source, for a part from outside the package or one that runs code from there; else empty."""
+        return "".join(self.sources.values())
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Digest of the source of all code from outside the package that the part runs, by kind or place."""
         factory = self.factory
         home = getattr(factory, "__module__", type(factory).__module__)
-        own = [] if foreign.is_own(home) else [getattr(factory, "kind", factory)]
-        own += [foreign.load(place, self.slot.registry.sort) for place in self.settings.code()]
-        return "".join(foreign.source_digest(thing) for thing in own)
+        own = {} if foreign.is_own(home) else {self.kind: getattr(factory, "kind", factory)}
+        own |= {place: foreign.load(place, self.slot.registry.sort) for place in self.settings.code()}
+        return {name: foreign.source_digest(thing) for name, thing in own.items()}
 
 
 def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Part[B]:
