@@ -142,6 +142,16 @@ def same_code(one: Batch, *others: Batch) -> bool:
     return all(_written(other) == written for other in unlike.values())
 
 
+def same_trace(one: Batch, other: Batch) -> bool:
+    """Whether the loops of two batches compute the same of their numbers, whatever their parts' settings.
+
+    Parameters
+    ----------
+    one, other : Batch
+    """
+    return _written(one) == _written(other)
+
+
 def _written(batch: Batch) -> list[Any]:
     """All that a loop's trace computes, as values that can be compared."""
     sections = trace(batch).sections

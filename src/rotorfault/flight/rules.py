@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, partial
+from functools import cached_property
+from itertools import islice
 from typing import Any, NamedTuple, final, get_args
 
 import numpy as np
@@ -13,8 +14,8 @@ from pydantic import BaseModel, ValidationError
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.base.foreign import in_one_line
 from rotorfault.engine import have_simd, load_engine
-from rotorfault.engine.batch import Batch, Recording, drive_rows, drive_template, no_watch
-from rotorfault.engine.program import trace
+from rotorfault.engine.batch import Batch, Recording, columns, drive_rows, drive_template, no_watch
+from rotorfault.engine.program import same_trace, trace
 from rotorfault.flight.assembly import assemble, begins_alike, initial_state, reference_of, start_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, leaf_names, unflatten
@@ -35,6 +36,14 @@ class Check(NamedTuple):
     rule: str
     kept: bool
     detail: str
+
+
+class Walk(NamedTuple):
+    """The steps of a flight on floats."""
+
+    before: Array  # (steps, leaves of the state): before each step
+    signals: Array  # (steps, rows of the layout)
+    end: Array  # (leaves of the state,)
 
 
 def scenario_with(part: Part[Any], **others: Any) -> Scenario:
@@ -92,13 +101,16 @@ class Rules:
         if self.part.make().python_only:
             yield Check("every engine gives the same numbers", True, "python engine only, as it says")
             return
-        yield _try("the same step twice gives the same", self._pure)
-        yield _try("no choice depends on a value", self._traced)
-        for engine in ("numpy", "simd"):
-            if engine == "numpy" or have_simd():
-                yield _try(f"engine {engine} gives the numbers of floats", partial(self._agrees, engine))
+        yield (pure := _try("the same step twice gives the same", self._pure))
+        yield (traced := _try("no choice depends on a value", self._traced))
+        same_anywhere = pure.kept and traced.kept
+        if same_anywhere:
+            yield _try("engine numpy gives the numbers of floats", self._agrees_on_arrays)
+            if have_simd():
+                yield _try("engine simd gives the numbers of floats", self._agrees_compiled)
         if slot.side != "task":
-            yield _try("no number of its settings is baked into its code", self._not_baked)
+            if same_anywhere:
+                yield _try("no number of its settings is baked into its code", self._not_baked)
             yield _try("every number of its settings is a parameter", self._parameters)
         if slot.name in PASSES_NAN:
             yield _try("what is no number comes through", self._passes_nan)
@@ -108,18 +120,24 @@ class Rules:
         return scenario_with(self.part)
 
     @cached_property
+    def _batch(self) -> Batch:
+        """The flight, of one and the same loop for all who ask: what a part keeps to itself shows."""
+        return assemble(self._scenario)
+
+    @cached_property
     def _flown(self) -> Recording:
         """A flight on floats, by which the others are judged."""
-        return load_engine("python")(self._batch(), no_watch)
+        return load_engine("python")(self._batch, no_watch)
 
-    def _batch(self, flights: int = 1) -> Batch:
-        """Flights with parts of their own, all alike."""
-        batch = assemble(self._scenario)
-        if flights == 1:
-            return batch
-        seeds = batch.seeds * flights
-        state = initial_state(batch.loop, start_of(self._scenario), batch.reference, seeds, batch.parameters)
-        return batch._replace(state=state, flights=flights, seeds=seeds)
+    @cached_property
+    def _walk(self) -> Walk:
+        """The steps of that flight once more, with the state before each."""
+        batch, state, before, signals = self._batch, self._batch.state, [], []
+        for drive in islice(_drives(batch), len(self._flown.signals)):
+            before.append(_numbers(state))
+            state, told, *_ = batch.loop.step(state, drive, batch.parameters)
+            signals.append(_numbers(told))
+        return Walk(np.array(before), np.array(signals), _numbers(state))
 
     def _described(self) -> str:
         line = (self.part.factory.__doc__ or "").strip().partition("\n")[0]
@@ -143,7 +161,7 @@ class Rules:
             rows, named = (leaf_names(record) for record in (source.signals(np.zeros(1)), example(source.Telemetry)))
             _require(rows == named, told.format(_difference(rows, named)))
             return ""
-        batch = self._batch()
+        batch = self._batch
         after, recorded = batch.loop.step(batch.state, next(_drives(batch)), batch.parameters)
         rows = [name.removeprefix("parts.") for name in leaf_names(recorded)]
         named = list(batch.loop.layout.rows)
@@ -155,7 +173,7 @@ class Rules:
         return f"memory: {sum(self.part.slot.name in name.split('.')[:3] for name in before)} numbers"
 
     def _flies(self) -> str:
-        batch, flown = self._batch(), self._flown
+        batch, flown = self._batch, self._flown
         finite = np.isfinite(flown.signals).all(axis=(0, 2))
         _require(bool(finite.all()), f"signal {batch.loop.layout.rows[int(np.argmin(finite))]} is not finite")
         count = len(flown.signals)
@@ -175,18 +193,15 @@ class Rules:
             first, again = (reference_of(self._scenario, source) for _ in range(2))
             _require(_same(first, again), told)
             return ""
-        batch = self._batch()
-        state = batch.state
-        for drive in _drives(batch):
-            one, other = (batch.loop.step(state, drive, batch.parameters) for _ in range(2))
-            _require(_same(_numbers(one), _numbers(other)), told)
-            state = one[0]
+        _require(_same(self._walk.signals, self._flown.signals[:, :, 0]), told)
+        # What has no signal shows in the memory, up to which the engine flew unless the flight was over before.
+        _require(len(self._walk.before) < STEPS or _same(self._walk.end, self._flown.state[:, 0]), told)
         return ""
 
     def _traced(self) -> str:
         """The step runs on symbols, which have no value to choose by."""
         try:
-            sections = trace(self._batch()).sections
+            sections = trace(self._batch).sections
         except Exception as error:
             raise BrokenRuleError(
                 f"{in_one_line(error)}; instead of 'if', comparisons and functions of other libraries use those of "
@@ -194,36 +209,41 @@ class Rules:
             ) from error
         return f"{sum(len(section.tape.terms) for section in sections)} operations"
 
-    def _agrees(self, engine: str) -> str:
-        batch = self._batch(flights=2)  # as arrays of two: one of one can be taken for a number
-        signals, wanted = load_engine(engine)(batch, no_watch).signals, self._flown.signals
-        size = np.maximum(1.0, np.abs(wanted).max(axis=0))
-        worst = (np.abs(signals - wanted) / size).max(axis=(0, 2))
-        name = batch.loop.layout.rows[int(np.argmax(worst))]
-        _require(
-            worst.max() <= AGREE, f"{name} differs by {worst.max():.2g}; use the functions of scalar, and no other"
-        )
-        return f"largest difference {worst.max():.1e} ({name})"
+    def _agrees_on_arrays(self) -> str:
+        """All steps of the flight at once, from the states of floats: each has to lead where it led on floats."""
+        batch, walk = self._batch, self._walk
+        two = (start_of(self._scenario), batch.reference, batch.seeds * 2, batch.parameters)
+        first = columns(initial_state(batch.loop, *two), 2)
+        _require_close(first.T, walk.before[:1], leaf_names(batch.state))
+        drives = np.array([_numbers(drive) for drive in islice(_drives(batch), len(walk.before))])
+        records = (batch.state, drive_template(batch), batch.parameters)
+        rows = [*walk.before.T, *drives.T, *columns(batch.parameters, len(drives))]
+        with np.errstate(all="ignore"):
+            after, told = batch.loop.step(*unflatten(records, rows))
+        _require_close(columns(after, len(drives)).T, np.vstack([walk.before[1:], walk.end]), leaf_names(batch.state))
+        return _require_close(columns(told, len(drives)).T, walk.signals, batch.loop.layout.rows)
+
+    def _agrees_compiled(self) -> str:
+        """The flight, from its start to its end."""
+        signals = load_engine("simd")(self._batch, no_watch).signals[:, :, 0]
+        return _require_close(signals, self._flown.signals[:, :, 0], self._batch.loop.layout.rows)
 
     def _not_baked(self) -> str:
-        """Numbers of other settings in this part's code give just what a part of those settings gives."""
+        """This part's code, given numbers of other settings, is that of a part of those settings."""
         changed, paths = self.part, float_settings(self.part)
         for path in paths:
             changed = nudged(changed, [path])
         if not paths:
             return "no numbers"
-        flown, here = scenario_with(changed), self._batch().loop
+        flown = scenario_with(changed)
         other = assemble(flown)
-        told = "a number of the settings acts in {} directly; take it from the parameters"
-        _require(begins_alike(here, flown, other), told.format("`initial`"))
-        one, two = (load_engine("python")(other._replace(loop=loop), no_watch) for loop in (here, other.loop))
-        _require(_same(one.signals, two.signals), told.format("`step`"))
-        # What has no signal, such as the onset of a fault, shows in what is counted.
-        _require(_same(one.state, two.state), told.format("the code"))
+        told = "a number of the settings acts directly in {}; take it from the parameters"
+        _require(begins_alike(self._batch.loop, flown, other), told.format("`initial`"))
+        _require(same_trace(self._batch, other), told.format("`step` or what it calls"))
         return f"{len(paths)} numbers"
 
     def _parameters(self) -> str:
-        before = flatten(self._batch().parameters)
+        before = flatten(self._batch.parameters)
         for path in float_settings(self.part):
             after = flatten(assemble(scenario_with(nudged(self.part, [path]))).parameters)
             name = ".".join(map(str, path))
@@ -251,6 +271,15 @@ class BrokenRuleError(Exception):
 def _require(kept: bool, told: str) -> None:
     if not kept:
         raise BrokenRuleError(told)
+
+
+def _require_close(found: Array, wanted: Array, names: Sequence[str]) -> str:
+    """Compare numbers, with their names in the last axis; says by how much they differ at most."""
+    size = np.maximum(1.0, np.abs(wanted).max(axis=0))
+    worst = (np.abs(found - wanted) / size).max(axis=0)
+    name = names[int(np.argmax(worst))]
+    _require(worst.max() <= AGREE, f"{name} differs by {worst.max():.2g}; use the functions of scalar, and no other")
+    return f"largest difference {worst.max():.1e} ({name})"
 
 
 def _try(rule: str, check: Callable[[], str]) -> Check:
