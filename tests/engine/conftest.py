@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from engine_flights import Array, case_one, run
+from engine_flights import Array, faulty_case_one, run
 
 from rotorfault.engine import have_simd
 
 
 @pytest.fixture(scope="session")
-def simd_case_one() -> Array:
+def simd_faulty_case_one() -> Array:
     if not have_simd():
         pytest.skip("needs llvmlite")
-    return run(case_one(duration=4.0), "simd").signals
+    return run(faulty_case_one(), "simd").signals

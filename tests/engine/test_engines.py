@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cascade_step import cascade
-from engine_flights import OWN, Array, assert_same, case_one, every_engine, run, short
+from engine_flights import FAULTS, OWN, Array, assert_same, every_engine, faulty_case_one, run, short
 from gates import needs_simd
 
 import rotorfault
@@ -22,21 +22,21 @@ from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.neighbours import neighbour
 
 
-def test_python_agrees_with_simd(simd_case_one: Array) -> None:
-    """4 s of case 1 with both faults at 1.8 s."""
-    found = run(case_one(duration=4.0), "python").signals
+def test_python_agrees_with_simd(simd_faulty_case_one: Array) -> None:
+    """1 s of case 1 with both faults at 0.4 s."""
+    found = run(faulty_case_one(), "python").signals
     assert found[-1, OWN.rows.index("fault_flag.r1"), 0] == 1.0
     assert found[-1, OWN.rows.index("fault_flag.r3"), 0] == 1.0
-    assert_same(found, simd_case_one)
+    assert_same(found, simd_faulty_case_one)
 
 
 def test_numpy_agrees_with_simd() -> None:
-    """The first 3 s of case 1, and of a neighbour whose faults come at 1 s, at 2 ms."""
+    """1 s of case 1, and of a neighbour whose faults come earlier, at 2 ms."""
     pytest.importorskip("llvmlite")
-    base = case_one(duration=3.0, period=0.002, step=0.002)
-    batch = assemble_all([base, neighbour(base, 3, onset=(1.0, 1.0))])
+    base = faulty_case_one(period=0.002, step=0.002)
+    batch = assemble_all([base, neighbour(base, 3, onset=(0.3, 0.3))])
     found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
-    assert found.shape == (1500, len(batch.loop.layout), 2)
+    assert found.shape == (500, len(batch.loop.layout), 2)
     assert (found[-1, OWN.rows.index("fault_flag.r1")] == 1.0).all()
     assert_same(found, wanted)
 
@@ -91,7 +91,7 @@ def test_without_llvmlite_the_other_engines_serve(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("period", [0.003, 0.01])
 def test_many_integration_steps_in_a_period_agree_too(period: float) -> None:
     """The engine then compiles the sampling instant and the integration step apart."""
-    settings = {"duration": 2.4, "period": period, "diagnosis.poles": [60.0, 80.0]}
+    settings = {"duration": 1.2, "period": period, "diagnosis.poles": [60.0, 80.0]} | FAULTS
     python = rotorfault.fly("paper-set-point", settings=settings, engine="python")
     simd = rotorfault.fly("paper-set-point", settings=settings, engine="simd")
     assert np.abs(python.data["position"] - simd.data["position"]).max() < 1e-9

@@ -7,9 +7,21 @@ import pytest
 from engine_flights import POSITION, every_engine, run, short
 
 from rotorfault.engine import ENGINES, have_simd
-from rotorfault.engine.batch import CHUNK
 from rotorfault.flight.assembly import assemble, assemble_all
 from rotorfault.maths.records import leaf_names
+
+CHUNK = 60  # steps in these tests: how many there are changes nothing but when an engine looks about
+
+
+@pytest.fixture(autouse=True)
+def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    set_chunk(monkeypatch, CHUNK)
+
+
+def set_chunk(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
+    for module in ("batch", "simd"):
+        if module != "simd" or have_simd():
+            monkeypatch.setattr(f"rotorfault.engine.{module}.CHUNK", steps)
 
 
 def test_only_wanted_signals_are_recorded() -> None:
@@ -81,10 +93,10 @@ def test_a_lost_flight_is_data(engine: str) -> None:
 def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last record of a flight is the first one from its end on, whenever the engine notices the end."""
     falling = [
-        short(duration=3.0, record_period=0.035, sensors="ideal", fault=[fault])
+        short(duration=1.25, record_period=0.035, sensors="ideal", fault=[fault])
         for fault in (
+            {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0},
             {"kind": "step", "rotor": 2, "time": 0.1, "loss": 1.0},
-            {"kind": "step", "rotor": 2, "time": 0.6, "loss": 1.0},
         )
     ]
     both = run(assemble_all(falling), engine)
@@ -92,6 +104,7 @@ def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeyp
     ends = both.state[names.index("scores.end")]
     assert (both.state[names.index("scores.over")] != 0.0).all()
     last = np.ceil(ends / 7).astype(int)
+    assert ends[0] < CHUNK < ends[1]
     assert last[0] < last[1] == len(both.steps) - 1
     assert np.isfinite(both.signals[: last[0] + 1, :, 0]).all()
     assert np.isnan(both.signals[last[0] + 1 :, :, 0]).all()
@@ -99,16 +112,14 @@ def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeyp
         alone = run(scenario, engine)
         assert len(alone.steps) == last[i] + 1
         np.testing.assert_array_equal(alone.signals[:, :, 0], both.signals[: last[i] + 1, :, i])
-    for module in ("batch", "simd"):
-        if module != "simd" or have_simd():
-            monkeypatch.setattr(f"rotorfault.engine.{module}.CHUNK", 13)
+    set_chunk(monkeypatch, 13)
     np.testing.assert_array_equal(run(assemble_all(falling), engine).signals, both.signals)
 
 
 @every_engine
 def test_an_end_between_two_records_far_apart_is_recorded(engine: str) -> None:
     """The engine flies on until the record, though nothing else is left to fly for."""
-    fault = {"kind": "step", "rotor": 2, "time": 0.1, "loss": 1.0}
+    fault = {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0}
     batch = assemble(short(duration=0.005 * 3 * CHUNK, record_period=0.005 * (CHUNK + 3), fault=[fault]))
     found = run(batch, engine)
     assert 0 < found.state[leaf_names(batch.state).index("scores.end"), 0] < CHUNK

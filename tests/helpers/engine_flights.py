@@ -25,8 +25,12 @@ _NEEDS = {"simd": [needs_simd]}
 every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
 
 
-def case_one(**changes: Any) -> Scenario:
-    return load_scenario("paper-set-point", {"controller.kind": "roismc"} | changes)
+FAULTS = {"fault.0.time": 0.4, "fault.1.time": 0.4}  # of case 1, early
+
+
+def faulty_case_one(**changes: Any) -> Scenario:
+    """1 s of case 1 with both faults in it."""
+    return load_scenario("paper-set-point", {"controller.kind": "roismc", "duration": 1.0} | FAULTS | changes)
 
 
 def short(**tables: Any) -> Scenario:
