@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 pytest.importorskip("llvmlite")
 
 from rotorfault.bench import flights, peak, study
-from rotorfault.bench.sdre import OURS, SCIPY, measure
+from rotorfault.bench.sdre import OURS, SCIPY
 from rotorfault.engine.function import CompiledFunction
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten, unflatten
@@ -33,8 +34,22 @@ def test_a_compiled_function_does_what_it_does_on_floats() -> None:
     np.testing.assert_array_equal(compiled(rows[:, 5:6]), found[:, 5:6])  # the same alone and in any batch
 
 
-def test_the_riccati_measurement_solves_what_it_times() -> None:
-    found = measure(quick=True)
+@pytest.fixture(scope="module")
+def everything() -> dict[str, Any]:
+    """All measurements, of small sizes, but accuracy, which is measured elsewhere."""
+    said: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(flights, "SIZES", (9, 10_000))
+        patch.setattr(flights, "SCALES", (64, 256, 1_024))
+        patch.setattr(flights, "different", lambda count, seed=1: {"seed": np.arange(min(count, 20))})
+        patch.setattr(study.importlib.util, "find_spec", lambda name: None if name == "heyoka" else True)
+        found = study.run(False, True, said.append)
+    assert said
+    return found
+
+
+def test_the_riccati_measurement_solves_what_it_times(everything: dict[str, Any]) -> None:
+    found = everything["sdre"]
     assert 2 <= found["steps"] <= 8
     assert found["own_residual"] <= 1e-12
     assert found["in_flight_us"] > 0.0
@@ -48,14 +63,9 @@ def test_the_riccati_measurement_solves_what_it_times() -> None:
         assert part["single_over_scipy"] > 0.0
 
 
-def test_bench_measures_everything_and_says_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small sizes; no time is judged, only that each number is there and is what it says."""
-    monkeypatch.setattr(flights, "SIZES", (9, 10_000))
-    monkeypatch.setattr(flights, "different", lambda count, seed=1: {"seed": np.arange(min(count, 20))})
-    monkeypatch.setattr(study.importlib.util, "find_spec", lambda name: None if name == "heyoka" else True)
-    said: list[str] = []
-    found = study.run(False, True, said.append)
-    assert said
+def test_bench_measures_everything_and_says_it(everything: dict[str, Any], tmp_path: Path) -> None:
+    """No time is judged, only that each number is there and is what it says."""
+    found = everything
     study.save(found, tmp_path / "bench.json")
     saved = json.loads((tmp_path / "bench.json").read_text())
     assert saved["batch"]["10000"]["steps_per_s_per_core"] > 0.0
@@ -64,6 +74,8 @@ def test_bench_measures_everything_and_says_it(tmp_path: Path, monkeypatch: pyte
     )
     assert 0.0 < saved["operations"]["share_of_peak"] < 1.0
     assert saved["operations"]["flops"] > 1000
+    assert set(saved["scaling"]) == {"64", "256"}
+    assert all(part["us_per_flight"] > 0.0 for part in saved["scaling"].values())
     assert set(saved["latency"]) == {"simd", "python", "numpy"}
     rows = {cells[0]: cells[1:] for line in study.text(found).splitlines() if len(cells := re.split("  +", line)) > 2}
     assert set(saved["batch"]) == {"9", "10000"}

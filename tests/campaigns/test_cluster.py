@@ -40,7 +40,8 @@ def complete(study: Study, folder: Path, executor: Executor) -> bytes:
 def test_a_killed_worker_costs_nothing(cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is lost and nothing is there twice: the very bytes of a campaign on this process alone."""
     monkeypatch.setattr("rotorfault.campaigns.rounds.FLIGHTS_IN_BLOCK", 6)
-    study = study_from(TINY, "test")
+    axes = [{"name": "loss", "values": [0.1, 0.9]}, {"name": "wind_speed", "values": [0.0, 8.0]}]
+    study = study_from({**TINY, "axis": axes}, "test")
     killed: list[int] = []
 
     class Watched:
@@ -61,7 +62,8 @@ def test_a_killed_worker_costs_nothing(cluster: Any, tmp_path: Path, monkeypatch
     assert found == complete(study, tmp_path / "alone", InProcess())
 
 
-def test_no_scheduler_is_one_clear_line() -> None:
+def test_no_scheduler_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask_executor, "PATIENCE", 0.2)
     with pytest.raises(InputError, match="cannot be reached"):
         executor_of(None, "tcp://127.0.0.1:1")
     with pytest.raises(InputError, match="allowed: an address such as"):

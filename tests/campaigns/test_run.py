@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import random
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
+import killable
 import numpy as np
 import pandas as pd
 import pytest
-from campaign_studies import TINY
+from campaign_studies import TINY, fly_in_small_blocks
 from gates import needs_simd
-from places import SOURCE
 
 import rotorfault
 from rotorfault.autopilot.control import CONTROLLER
@@ -114,33 +110,15 @@ def test_each_part_is_read_once_at_most(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_killed_at_any_moment_it_completes_to_the_same_table(tmp_path: Path, undisturbed: bytes) -> None:
     """Three kills at random moments, without a chance to tidy up."""
-    code = (
-        "import sys, rotorfault.campaigns.rounds as rounds\n"
-        "rounds.FLIGHTS_IN_BLOCK = 10\n"
-        "from rotorfault.base.executors import InProcess\n"
-        "from rotorfault.campaigns import run\n"
-        "from rotorfault.campaigns.study import study_from\n"
-        "from pathlib import Path\n"
-        f"study = study_from({TINY!r}, 'test')\n"
-        "folder = Path(sys.argv[1])\n"
-        "with run.open_store(study, folder, folder.exists()) as store:\n"
-        "    print('open', flush=True)\n"
-        "    run.fly(study, store, InProcess())\n"
-        "print('complete', flush=True)\n"
-    )
     folder, draw = tmp_path / "campaign", random.Random(3)
-    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
     for _ in range(3):
-        child = subprocess.Popen([sys.executable, "-c", code, str(folder)], env=environment, stdout=subprocess.PIPE)
-        assert child.stdout is not None
-        assert child.stdout.readline() == b"open\n"
+        process, said = killable.start(fly_in_small_blocks, folder)
+        assert said.recv() == "open"
         time.sleep(draw.uniform(0.0, 0.4))
-        child.send_signal(signal.SIGKILL)
-        child.wait()
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(folder)], env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.stdout.endswith("complete\n"), done.stderr
+        process.kill()
+        process.join()
+    process, said = killable.start(fly_in_small_blocks, folder)
+    assert killable.rest(said) == ["open", "complete"]
     assert (folder / "flights.parquet").read_bytes() == undisturbed
 
 

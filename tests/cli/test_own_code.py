@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from command_line import assert_refused, run, started
 
 import rotorfault as rf
 
@@ -59,23 +58,12 @@ def wind(folder: Path, speed: str = "parameters.speed", default: str = "3.0") ->
     return "wind.py:Mine"
 
 
-def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "rotorfault.cli.main", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False, timeout=300)
-
-
-def assert_refused(done: subprocess.CompletedProcess[str], *named: str) -> None:
-    assert done.returncode == 2, done.stderr + done.stdout
-    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
-    for word in named:
-        assert word in done.stderr
-
-
 def test_a_controller_s_file_shadows_no_module(tmp_path: Path) -> None:
     """A file of one's own may be called like a module of the library that the program needs after it."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "json.py").write_text(CONTROLLER)
-    done = run(tmp_path, "fly", "paper-set-point", "--controller", "mine/json.py:Mine", *SHORT, "--out", "out")
+    own = ("--controller", "mine/json.py:Mine", *SHORT)
+    done = started("fly", "paper-set-point", *own, "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "flown by Mine" in done.stdout
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["engine"] == "python"
@@ -83,7 +71,7 @@ def test_a_controller_s_file_shadows_no_module(tmp_path: Path) -> None:
 
 def test_a_part_is_flown_with_its_settings(tmp_path: Path) -> None:
     own = ("--set", f"wind.kind={wind(tmp_path)}", "--set", "wind.speed=7.5")
-    done = run(tmp_path, "fly", "paper-set-point", *own, *SHORT, "--out", "out")
+    done = run("fly", "paper-set-point", *own, *SHORT, "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     flight = rf.load(tmp_path / "out" / "flight.nc")
     assert (flight.data["wind"].values[:, 0] == 7.5).all()
@@ -93,17 +81,24 @@ def test_code_that_a_file_names_runs_only_if_it_is_allowed(tmp_path: Path) -> No
     """Of a scenario, and of a flight that is repeated."""
     (tmp_path / "mine.toml").write_text(SCENARIO.format(kind=wind(tmp_path)))
     for command in (("fly", "mine.toml", *SHORT), ("check", "mine.toml")):
-        assert_refused(run(tmp_path, *command), "wind.py:Mine", "--allow-code")
-        done = run(tmp_path, *command, "--allow-code")
+        assert_refused(run(*command, cwd=tmp_path), "wind.py:Mine", "--allow-code")
+        done = run(*command, "--allow-code", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     (file,) = (tmp_path / "results").glob("*/flight.nc")
     again = ("fly", "--repeat", str(file), "--no-figures")
-    assert_refused(run(tmp_path, *again), "wind.py:Mine", "--allow-code")
-    assert run(tmp_path, *again, "--allow-code").returncode == 0
+    assert_refused(run(*again, cwd=tmp_path), "wind.py:Mine", "--allow-code")
+    assert run(*again, "--allow-code", cwd=tmp_path).returncode == 0
 
 
+@pytest.fixture
+def short_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Flights of a check that are just as long as the command line needs to say what comes of it."""
+    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 15)
+
+
+@pytest.mark.usefixtures("short_checks")
 def test_check_says_which_rules_a_part_keeps(tmp_path: Path) -> None:
-    done = run(tmp_path, "check", wind(tmp_path))
+    done = run("check", wind(tmp_path), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     title, *rules = done.stdout.splitlines()
     assert title == "wind wind.py:Mine"
@@ -111,6 +106,7 @@ def test_check_says_which_rules_a_part_keeps(tmp_path: Path) -> None:
     assert all("kept" in rule for rule in rules)
 
 
+@pytest.mark.usefixtures("short_checks")
 @pytest.mark.parametrize(
     ("speed", "default", "more", "named"),
     [
@@ -123,11 +119,12 @@ def test_check_says_which_rules_a_part_keeps(tmp_path: Path) -> None:
 def test_check_refuses_in_one_line(
     speed: str, default: str, more: tuple[str, ...], named: tuple[str, ...], tmp_path: Path
 ) -> None:
-    assert_refused(run(tmp_path, "check", wind(tmp_path, speed, default), *more), *named)
+    assert_refused(run("check", wind(tmp_path, speed, default), *more, cwd=tmp_path), *named)
 
 
+@pytest.mark.usefixtures("short_checks")
 def test_check_gives_a_part_the_settings_that_it_needs(tmp_path: Path) -> None:
-    done = run(tmp_path, "check", wind(tmp_path, default="..."), "--set", "speed=2.0")
+    done = run("check", wind(tmp_path, default="..."), "--set", "speed=2.0", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     (tmp_path / "mine.toml").write_text("")
-    assert_refused(run(tmp_path, "check", "mine.toml", "--set", "speed=2.0"), "--set")
+    assert_refused(run("check", "mine.toml", "--set", "speed=2.0", cwd=tmp_path), "--set")

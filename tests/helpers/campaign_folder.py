@@ -1,25 +1,25 @@
-"""A folder of a campaign with made-up results, and a process that writes one."""
+"""A folder of a campaign with made-up results, and what a process does that writes one."""
 
 from __future__ import annotations
 
 import functools
 import os
-import subprocess
-import sys
+import random
+import signal
+import time
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pytest
-from places import HELPERS
 
 from rotorfault.campaigns.store.store import Key, Store
 
 STUDY: dict[str, Any] = {"name": "test", "wind": {"speed": 5.0}, "losses": [0.1, 0.2]}
 BLOCKS: list[Key] = [*((0, block) for block in range(6)), *((1, block) for block in range(4))]
 
-needs_posix = pytest.mark.skipif(os.name == "nt", reason="needs signals and limits of POSIX")
+LONG: list[Key] = [(round, block) for round in range(3) for block in range(60)]
 
 
 def results(round: int, block: int, flights: int = 20) -> pa.Table:
@@ -75,29 +75,18 @@ def everything(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
 
 
-# Puts every missing block, says so, and waits to be killed; `{trap}` may end it at a certain point before.
-WRITER = """
-import os, random, signal, sys, time
-from pathlib import Path
-sys.path.insert(0, {helpers!r})
-from campaign_folder import BLOCKS, STUDY, Store, missing, results, start
-folder = Path({folder!r})
-known = (folder / "study.json").exists()
-store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
-blocks = missing(store, [(r, b) for r in range(3) for b in range(100)])
-random.Random({seed}).shuffle(blocks)
-{trap}
-for key in blocks:
-    store.put(*key, results(*key))
-    print("put", flush=True)
-print("end", flush=True)
-time.sleep(600)
-"""
-
-
-def writer(folder: Path, seed: int = 0, trap: str = "") -> subprocess.Popen[str]:
-    code = WRITER.format(helpers=str(HELPERS), folder=str(folder), seed=seed, trap=trap)
-    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+def write(said: Connection, folder: Path, seed: int, trap: str) -> None:
+    """Put every missing block, say so, and wait to be killed; the trap is code that may end it before."""
+    known = (folder / "study.json").exists()
+    store = Store.open(folder, write=True, study=STUDY, digest="program") if known else start(folder)
+    blocks = missing(store, LONG)
+    random.Random(seed).shuffle(blocks)
+    exec(trap, {"os": os, "signal": signal, "Path": Path})
+    for key in blocks:
+        store.put(*key, results(*key))
+        said.send("put")
+    said.send("end")
+    time.sleep(600)
 
 
 def flip(path: Path) -> None:

@@ -1,8 +1,14 @@
-"""A study small enough for tests."""
+"""A study small enough for tests, and what a process does that flies it."""
 
 from __future__ import annotations
 
+from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
+
+from rotorfault.base.executors import InProcess
+from rotorfault.campaigns import rounds, run
+from rotorfault.campaigns.study import study_from
 
 TINY: dict[str, Any] = {
     "name": "tiny",
@@ -29,3 +35,13 @@ TINY: dict[str, Any] = {
     ],
     "refine": {"initial": 4, "block": 4, "most": 12, "width": 0.4},
 }
+
+
+def fly_in_small_blocks(said: Connection, folder: Path) -> None:
+    """Fly it in blocks of ten, or what is missing of it, and say when the folder is open and when it is complete."""
+    rounds.FLIGHTS_IN_BLOCK = 10
+    study = study_from(TINY, "test")
+    with run.open_store(study, folder, folder.exists()) as store:
+        said.send("open")
+        run.fly(study, store, InProcess())
+    said.send("complete")

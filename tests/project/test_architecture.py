@@ -29,6 +29,7 @@ LAZY = {
     "rotorfault.bench.sdre": {"control": OPTIONAL, "ctrlsys": OPTIONAL, "slycot": OPTIONAL},
     "rotorfault.bench.study": {"rotorfault.bench.accuracy_figure": MATPLOTLIB},
     "rotorfault.campaigns.api": {"rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load"},
+    "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
     "rotorfault.cli.catalogue": {"rotorfault.results.dataset": "xarray takes longer to load than a file to check"},
     "rotorfault.engine": {
         "rotorfault.engine.arrays": "one engine flies, the others need not load",

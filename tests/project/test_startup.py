@@ -43,25 +43,33 @@ FLIGHT = {
 }
 
 
-def modules(code: str, cwd: Path | None = None) -> set[str]:
-    """Names of the modules that a fresh Python has loaded after the code."""
-    ask = "import json, sys\nprint(json.dumps(sorted(sys.modules)))"
+def steps(*codes: str, cwd: Path | None = None) -> list[set[str]]:
+    """Names of the modules that a fresh Python has loaded after each of some pieces of code, one after the other."""
+    ask = "import json, sys\nprint('loaded', json.dumps(sorted(sys.modules)))"
+    code = "\n".join(f"{code}\n{ask}" for code in codes)
     done = subprocess.run(
-        [sys.executable, "-c", f"{code}\n{ask}"], capture_output=True, text=True, cwd=cwd, timeout=300, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=cwd, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
-    return set(json.loads(done.stdout.splitlines()[-1]))
+    told = [line.partition(" ")[2] for line in done.stdout.splitlines() if line.startswith("loaded ")]
+    assert len(told) == len(codes)
+    return [set(json.loads(names)) for names in told]
+
+
+def packages(names: set[str]) -> set[str]:
+    """Top-level packages among modules."""
+    return {name.partition(".")[0] for name in names}
+
+
+def rooms(names: set[str]) -> set[str]:
+    """Rooms of the package among modules."""
+    folders = {path.name for path in SOURCE.iterdir() if path.is_dir()}
+    return {name.split(".")[1] for name in names if name.startswith("rotorfault.")} & folders
 
 
 def loaded(code: str, cwd: Path | None = None) -> set[str]:
-    """Top-level packages among them."""
-    return {name.partition(".")[0] for name in modules(code, cwd)}
-
-
-def rooms(code: str, cwd: Path | None = None) -> set[str]:
-    """Rooms of the package among them."""
-    folders = {path.name for path in SOURCE.iterdir() if path.is_dir()}
-    return {name.split(".")[1] for name in modules(code, cwd) if name.startswith("rotorfault.")} & folders
+    """Top-level packages that a fresh Python has loaded after the code."""
+    return packages(steps(code, cwd=cwd)[0])
 
 
 def command(*arguments: str) -> str:
@@ -79,41 +87,58 @@ def test_all_public_names_are_listed_and_found() -> None:
         assert getattr(rotorfault, name) is not None
 
 
-def test_a_flight_loads_nothing_that_it_does_not_need(tmp_path: Path) -> None:
-    short = command("fly", "paper-set-point", "--set", "duration=0.2", "--no-figures")
-    found = loaded(short, tmp_path)
+def test_a_flight_from_the_command_line_loads_its_warnings_and_nothing_else(tmp_path: Path) -> None:
+    short = command("fly", "paper-set-point", "--set", "duration=0.1", "--no-figures")
+    (found,) = steps(short, cwd=tmp_path)
     assert "h5py" in found
-    assert not found & HEAVY
+    assert not packages(found) & HEAVY
+    assert rooms(found) == FLIGHT | {"analysis", "cli"}
     assert list(tmp_path.glob("results/*/flight.nc"))
 
 
-@pytest.mark.parametrize("arguments", [("list",), ("new", "scenario", "mine"), ("check", "mine.toml")])
-def test_small_commands_load_little(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    before = "" if arguments[0] != "check" else command("new", "scenario", "mine") + "\n"
-    assert not loaded(before + command(*arguments), tmp_path) & (HEAVY | {"heyoka", "h5py"})
+def test_small_commands_load_little(tmp_path: Path) -> None:
+    small = [("list",), ("new", "scenario", "mine"), ("check", "mine.toml")]
+    for arguments, names in zip(small, steps(*(command(*each) for each in small), cwd=tmp_path), strict=True):
+        assert not packages(names) & (HEAVY | {"heyoka", "h5py"}), arguments
 
 
 def test_the_help_loads_the_command_line_alone() -> None:
-    assert rooms("import rotorfault.cli.main") == {"base", "cli"}
-    assert not loaded("import rotorfault.cli.main") & (HEAVY | {"numpy", "pydantic", "heyoka", "h5py", "llvmlite"})
+    (found,) = steps("import rotorfault.cli.main")
+    assert rooms(found) == {"base", "cli"}
+    assert not packages(found) & (HEAVY | {"numpy", "pydantic", "heyoka", "h5py", "llvmlite"})
 
 
 FLY = "import rotorfault as rf\nflight = rf.fly('paper-set-point', settings={'duration': 0.1})\nflight.summary()"
 MANY = "import rotorfault as rf\nrf.fly_many('paper-set-point', {'seed': [1, 2]}, settings={'duration': 0.1})"
-EVERYTHING = f"{FLY}\nflight.save('flight.nc')"
+USES = {"flown": FLY, "saved": "flight.save('flight.nc')", "data": "flight.data['position']", "plot": "flight.plot()"}
 
 
-@pytest.mark.parametrize("code", [FLY, MANY, EVERYTHING], ids=["one", "many", "saved"])
-def test_a_flight_loads_the_rooms_of_a_flight(code: str, tmp_path: Path) -> None:
-    names = modules(code, tmp_path)
-    assert rooms(code, tmp_path) == FLIGHT
-    assert not {name.partition(".")[0] for name in names} & HEAVY
+@pytest.fixture(scope="module")
+def used(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+    """What is loaded after each use of a flight, in the order above."""
+    return dict(zip(USES, steps(*USES.values(), cwd=tmp_path_factory.mktemp("flight")), strict=True))
+
+
+@pytest.mark.parametrize("use", ["flown", "saved"])
+def test_a_flight_loads_the_rooms_of_a_flight(use: str, used: dict[str, set[str]]) -> None:
+    check_rooms(used[use])
+
+
+def test_many_flights_load_the_rooms_of_a_flight() -> None:
+    check_rooms(*steps(MANY))
+
+
+def check_rooms(names: set[str]) -> None:
+    assert rooms(names) == FLIGHT
+    assert not packages(names) & HEAVY
     assert not names & {"rotorfault.engine.taylor", "rotorfault.reference.curve", "rotorfault.flight.check_block"}
 
 
-def test_a_flight_from_the_command_line_loads_its_warnings_besides(tmp_path: Path) -> None:
-    code = command("fly", "paper-set-point", "--set", "duration=0.1", "--no-figures")
-    assert rooms(code, tmp_path) == FLIGHT | {"analysis", "cli"}
+def test_a_campaign_loads_no_distributions() -> None:
+    """Of SciPy it needs some functions; its statistics take longer to load than all else."""
+    (found,) = steps("import rotorfault.campaigns.api")
+    assert "scipy.special" in found
+    assert "scipy.stats" not in found
 
 
 def test_scipy_is_loaded_by_who_flies_along_a_table(tmp_path: Path) -> None:
@@ -123,7 +148,7 @@ def test_scipy_is_loaded_by_who_flies_along_a_table(tmp_path: Path) -> None:
     assert loaded(fly, tmp_path) & HEAVY == {"scipy"}
 
 
-def test_xarray_is_loaded_by_who_looks_at_the_data() -> None:
-    assert not loaded(FLY) & HEAVY
-    assert loaded(f"{FLY}\nflight.data['position']") & HEAVY >= {"xarray"}
-    assert "matplotlib" in loaded(f"{FLY}\nflight.plot()")
+def test_xarray_is_loaded_by_who_looks_at_the_data(used: dict[str, set[str]]) -> None:
+    assert not packages(used["saved"]) & HEAVY
+    assert packages(used["data"]) & HEAVY >= {"xarray"}
+    assert "matplotlib" in used["plot"]

@@ -38,7 +38,7 @@ def read(path: Path) -> xr.Dataset:
         return opened.load()
 
 
-@pytest.mark.parametrize("records", [1, 2, 20_000])
+@pytest.mark.parametrize("records", [1, 2, 4_000])  # the last in several chunks
 def test_the_file_reads_like_one_that_xarray_wrote(records: int, tmp_path: Path) -> None:
     data = made(records)
     netcdf.write_netcdf(data, tmp_path / "direct.nc")

@@ -8,22 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from gates import needs_simd
+from study_runs import ONE, SHORT, TWO, count
 
 import rotorfault as rf
 from rotorfault.studies.paper import study
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, run_of
 from rotorfault.studies.pool import fly_missing
 from rotorfault.studies.runs import Run, RunStore
-
-SHORT = (("duration", 0.05), ("record_period", 0.01))
-ONE = Run("one", "paper-set-point", SHORT, keep=True)
-TWO = Run("two", "paper-set-point", (*SHORT, ("controller.kind", "smc")))
-
-
-def count(data: xr.Dataset) -> dict[str, Any]:
-    return {"records": len(data["time"])}
 
 
 def test_a_run_is_flown_once(tmp_path: Path) -> None:

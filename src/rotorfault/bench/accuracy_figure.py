@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import count, cycle, pairwise
 from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -185,8 +186,8 @@ def _write(axes: Axes, text: str, spots: Sequence[Spot], taken: Sequence[Bbox], 
 
 def _covered(box: Bbox, taken: Sequence[Bbox], page: Bbox) -> float:
     """Area of a box that lies on others or outside the page."""
-    inside = Bbox.intersection(box, page)
-    outside = box.width * box.height - (0.0 if inside is None else inside.width * inside.height)
-    shared = (Bbox.intersection(box, other) for other in taken)
+    low, high = np.array([(other.min, other.max) for other in (page, *taken)]).swapaxes(0, 1)
+    sides = np.maximum(np.minimum(high, box.max) - np.maximum(low, box.min), 0.0)
+    inside, *shared = np.prod(sides, axis=1)
     # Rounding must not decide between two that cover nothing.
-    return max(outside, 1e-6) + sum(part.width * part.height for part in shared if part is not None)
+    return float(max(box.width * box.height - inside, 1e-6) + sum(shared))

@@ -29,6 +29,7 @@ from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.scenario import Scenario
 
 SIZES = (100, 1_000, 10_000)
+SCALES = (1_000, 10_000, 100_000)  # of the batches whose time and memory are compared; quick: without the last
 PERIOD = 1e-3  # s, of sampling and integration
 
 
@@ -134,12 +135,12 @@ def measure_single(quick: bool, say: Say) -> dict[str, Any]:
 
 
 def measure_scaling(quick: bool, say: Say) -> dict[str, Any]:
-    """Time per flight and peak memory of `rotorfault.fly_many` from 1,000 flights to 100,000 of 0.1 s.
+    """Time per flight and peak memory of `rotorfault.fly_many` for flights of 0.1 s in batches of `SCALES`.
 
     Each in a process of its own; its memory is all that the process ever held, Python and libraries included.
     """
     costs: dict[str, Any] = {}
-    for size in (1_000, 10_000) if quick else (1_000, 10_000, 100_000):
+    for size in SCALES[:-1] if quick else SCALES:
         say(f"{size:,} flights through fly_many")
         done = subprocess.run(
             [sys.executable, "-c", f"from rotorfault.bench.flights import alone; alone({size})"],

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.axes import axis
@@ -122,6 +121,8 @@ def _designed(study: Study, flights: FlightSet) -> NDArray[np.float64]:
 @lru_cache(maxsize=100_000)
 def _points(design: str, seed: int, cell: int, dimensions: int, count: int) -> NDArray[np.float64]:
     """All points of a cell, however many of them are flown: a prefix of them must not depend on the rest."""
+    from scipy.stats import qmc  # takes most of the time that a campaign loads, and most have no such design
+
     generator = np.random.default_rng([seed, cell])
     if design == "sobol":
         sampler = qmc.Sobol(dimensions, scramble=True, rng=generator)

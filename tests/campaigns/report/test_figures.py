@@ -29,7 +29,6 @@ def test_figures_cover_nothing(made: tuple[str, Maps, dict[str, Figure]]) -> Non
     }
     assert set(drawn) == wanted[name]
     for title, figure in drawn.items():
-        figure.canvas.draw()
         check_nothing_covered(f"{name} {title}", figure)
 
 

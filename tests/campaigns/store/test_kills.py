@@ -7,44 +7,42 @@ import signal
 import time
 from pathlib import Path
 
+import killable
 import pytest
-from campaign_folder import STUDY, everything, filled, missing, needs_posix, results, start, writer
+from campaign_folder import LONG, STUDY, everything, filled, missing, results, start, write
+from gates import needs_posix
 
 from rotorfault.base.errors import InputError
-from rotorfault.campaigns.store.store import Key, Store
+from rotorfault.campaigns.store.store import Store
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Key], bytes]:
-    """Blocks of the long campaign, and its whole file as written in one go."""
-    blocks = [(round, block) for round in range(3) for block in range(100)]
-    with Store.open(filled(tmp_path_factory.mktemp("long") / "campaign", blocks), write=True) as store:
-        return blocks, store.finish(blocks).read_bytes()
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The whole file of the long campaign as written in one go."""
+    with Store.open(filled(tmp_path_factory.mktemp("long") / "campaign", LONG), write=True) as store:
+        return store.finish(LONG).read_bytes()
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_killed_run_is_completed_to_the_same_table(
-    seed: int, tmp_path: Path, uninterrupted: tuple[list[Key], bytes]
-) -> None:
-    blocks, straight = uninterrupted
+def test_a_killed_run_is_completed_to_the_same_table(seed: int, tmp_path: Path, uninterrupted: bytes) -> None:
     rng, folder, told = random.Random(seed), tmp_path / "campaign", 0
     for attempt in range(4):
-        process = writer(folder, seed=10 * seed + attempt)
-        assert process.stdout is not None
+        process, said = killable.start(write, folder, 10 * seed + attempt, "")
         for _ in range(rng.randrange(1, 40)):
-            told += process.stdout.readline() == "put\n"
+            told += said.recv() == "put"
         time.sleep(rng.uniform(0.0, 0.004))
         process.kill()
-        told += process.stdout.read().count("put\n")
-        assert process.wait() != 0
+        told += killable.rest(said).count("put")
+        process.join()
+        assert process.exitcode != 0
         # Nothing that was told is lost, and nothing half-written is taken for a part.
         assert len(Store.open(folder).done()) in (told, told + 1)
         told = len(Store.open(folder).done())
     with Store.open(folder, write=True, study=STUDY, digest="program") as store:
         assert {path.suffix for path in (folder / "parts").iterdir()} == {".parquet"}
-        for key in missing(store, blocks):
+        for key in missing(store, LONG):
             store.put(*key, results(*key))
-        assert store.finish(blocks).read_bytes() == straight
+        assert store.finish(LONG).read_bytes() == uninterrupted
 
 
 @needs_posix
@@ -59,8 +57,9 @@ def test_a_killed_run_is_completed_to_the_same_table(
 )
 def test_a_kill_at_each_step_of_writing(trap: str, kept: int, tmp_path: Path) -> None:
     folder = tmp_path / "campaign"
-    process = writer(folder, trap=trap)
-    assert process.wait(timeout=60) == -signal.SIGKILL
+    process, _ = killable.start(write, folder, 0, trap)
+    process.join(timeout=60)
+    assert process.exitcode == -signal.SIGKILL
     leftovers = [path for path in (folder / "parts").iterdir() if path.suffix == ".tmp"]
     assert len(leftovers) == 1 - kept
     assert len(Store.open(folder).done()) == kept

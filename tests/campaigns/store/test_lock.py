@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import killable
 import pytest
-from campaign_folder import results, writer
+from campaign_folder import results, write
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.store.lock import Lock
@@ -34,13 +35,12 @@ def test_two_writers_are_one_too_many(folder: Path) -> None:
 
 def test_a_lock_dies_with_its_process(tmp_path: Path) -> None:
     folder = tmp_path / "campaign"
-    process = writer(folder)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "put\n"
+    process, said = killable.start(write, folder, 0, "")
+    assert said.recv() == "put"
     with pytest.raises(InputError, match=rf"process {process.pid} on"):
         Store.open(folder, write=True)
     process.kill()
-    process.wait()
+    process.join()
     Store.open(folder, write=True).close()
 
 

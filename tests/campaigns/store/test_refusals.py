@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from campaign_folder import BLOCKS, STUDY, everything, missing, needs_posix, results, start, undisturbed
+from campaign_folder import BLOCKS, STUDY, everything, missing, results, start, undisturbed
+from gates import needs_posix
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.store import identity as identity_module

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from rotorfault.report.bars import Column, error_figure
 from rotorfault.report.path_figure import _once
 from rotorfault.report.rotor_layout import layout_figure
 from rotorfault.results.flight_data import FORMAT
+from rotorfault.studies import runs
 from rotorfault.studies.paper import figures
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.runs import Result, Run
@@ -61,14 +64,16 @@ def summary(run: Run, seed: int) -> dict[str, object]:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Result]:
+def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Result]]:
     folder, made = tmp_path_factory.mktemp("flights"), {}
     for seed, run in enumerate(run for run in main_runs() if run.id in figures.needed()):
         path = folder / f"{run.id}.nc"
         if run.id.endswith("-1ms"):
             save(flight(run, seed), path)
         made[run.id] = Result(run, summary(run, seed), {}, 0.0, path)
-    return made
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runs, "load", cache(runs.load))  # nobody changes these flights
+        yield made
 
 
 @pytest.fixture(scope="module")

@@ -202,9 +202,12 @@ def test_claims_are_written_as_a_list_of_objects(results: dict[str, Result], tmp
     assert all(needed <= set(entry) for entry in content)
 
 
+COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+
+
 def understood(command: str) -> None:
     _, name, *arguments = shlex.split(command)
-    given = typer.main.get_command(app).commands[name].make_context(name, list(arguments)).params  # type: ignore[attr-defined]
+    given = COMMANDS[name].make_context(name, list(arguments)).params
     pairs = parse_overrides(given["assignments"] or [])
     if given["preset"]:
         pairs = {"controller.preset": given["preset"], **pairs}
