@@ -144,9 +144,7 @@ def test_no_import_cycle() -> None:
 @pytest.mark.parametrize("path", FILES, ids=module_name)
 def test_an_import_inside_a_function_is_listed_with_its_reason(path: Path) -> None:
     module = module_name(path)
-    functions = [
-        n for n in ast.walk(tree_of(path)) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)
-    ]
+    functions = [n for n in ast.walk(tree_of(path)) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {name for function in functions for name in imports(function, module, path)}
     if module in COMMANDS:
         assert inside
