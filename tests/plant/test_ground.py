@@ -105,7 +105,7 @@ def test_touching_a_steep_wall_of_force_keeps_the_integrator_accurate() -> None:
 def test_friction_stops_a_slide_where_coulomb_says() -> None:
     """v^2 / (2 mu g), started at the depth of rest; the smoothed slip lengthens it by little."""
     vehicle = HUMMINGBIRD._replace(linear_drag=0.0)
-    _, seen = fall(vehicle, "rigid_body", 500, p_W=Vec3(0.0, 0.0, -0.002), v_W=Vec3(0.5, 0.0, 0.0))
+    _, seen = fall(vehicle, "rigid_body", 250, period=0.002, p_W=Vec3(0.0, 0.0, -0.002), v_W=Vec3(0.5, 0.0, 0.0))
     assert seen[-1].state.p_W.x == pytest.approx(0.25 / (2.0 * 0.6 * 9.81), rel=0.1)
 
 
