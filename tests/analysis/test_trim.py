@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from cascade_step import CONTROLLERS
 from scipy.linalg import expm
-from spring import Spring
+from spring import Spring, SpringBlock
 
 from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.analysis.linearisation import AXES, LinearLoop, linearise
 from rotorfault.analysis.margins import Margins, margins
-from rotorfault.analysis.trim import hover, hover_loop, trim_report
+from rotorfault.analysis.trim import TrimReport, hover, hover_loop, trim_report
 from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.base.errors import InputError
 from rotorfault.cli.losses import parse_losses
@@ -43,10 +43,6 @@ def loop_of(A: np.ndarray, b: np.ndarray, K: np.ndarray, period: float) -> Linea
 
 def radius(A: np.ndarray) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(A))))
-
-
-def spring_loop(vehicle: Vehicle, **gains: float) -> LinearLoop:
-    return linearise(*hover_loop(vehicle, PythonController(Spring(**gains)), T))
 
 
 def check_margins(linear: LinearLoop, axis: str, m: Margins) -> None:
@@ -94,7 +90,12 @@ def test_hover_of_a_vehicle_too_heavy(paper_vehicle: Vehicle) -> None:
 
 @pytest.fixture(scope="module")
 def spring(paper_vehicle: Vehicle) -> LinearLoop:
-    return spring_loop(paper_vehicle)
+    return linearise(*hover_loop(paper_vehicle, SpringBlock(), T))
+
+
+@pytest.fixture(scope="module")
+def unstable(paper_vehicle: Vehicle) -> TrimReport:
+    return trim_report(paper_vehicle, PythonController(Spring(k1=3000.0, k2=3.0)), period=T)
 
 
 def test_poles_of_constant_gains_are_known(paper_vehicle: Vehicle, spring: LinearLoop) -> None:
@@ -145,7 +146,7 @@ def test_floats_and_arrays_linearise_alike(paper_vehicle: Vehicle) -> None:
 
 def test_an_offset_hover_is_found(paper_vehicle: Vehicle) -> None:
     """With a true mass that the autopilot does not know, hover is lower: m' g = m (g + 6 dz)."""
-    loop, parameters = hover_loop(paper_vehicle, PythonController(Spring()), T)
+    loop, parameters = hover_loop(paper_vehicle, SpringBlock(), T)
     heavy = parameters._replace(vehicle=paper_vehicle._replace(mass=1.77 * 1.1))
     linear = linearise(loop, heavy)
     assert linear.residual < 1e-9
@@ -243,33 +244,34 @@ def test_all_axes_of_a_vehicle(spring: LinearLoop) -> None:
     assert found["yaw"].gain_up == pytest.approx(alone.gain_up, rel=1e-6)
 
 
-def test_an_unstable_loop_has_no_margins(paper_vehicle: Vehicle) -> None:
-    linear = spring_loop(paper_vehicle, k1=3000.0, k2=3.0)
-    assert not linear.stable
-    assert all(math.isnan(m.delay) for m in margins(linear).values())
+def test_an_unstable_loop_has_no_margins(unstable: TrimReport) -> None:
+    assert unstable.linear is not None
+    assert not unstable.linear.stable
+    assert all(math.isnan(m.delay) for m in margins(unstable.linear).values())
 
 
 def test_the_delay_margin_holds_in_flight(paper_vehicle: Vehicle) -> None:
     """The true, nonlinear loop with the demanded yaw torque late by just less, and just more, than the margin."""
-    loop, parameters = hover_loop(paper_vehicle, PythonController(Spring()), T)
+    period = 0.005
+    loop, parameters = hover_loop(paper_vehicle, SpringBlock(), period)
     linear = linearise(loop, parameters)
-    whole = math.floor(margins(linear)["yaw"].delay / T)
+    whole = math.floor(margins(linear)["yaw"].delay / period)
     sign = paper_vehicle.rotor_yaw_sign
 
     def swing(delay: int) -> tuple[float, float]:
-        """Largest yaw in the second and in the last half second of two and a half."""
+        """Largest yaw in the second and in the last half second of two."""
         drive, start = loop.drive(), loop.level_start(zeros())._replace(attitude=Vec3(0.0, 0.0, 0.01))
         state = loop.initial(start, drive, parameters)
         asked, yaws = [0.0] * delay, []
-        for k in range(round(2.5 / T)):
+        for k in range(round(2.0 / period)):
             after, _, signals = loop.decide(state, drive, parameters)
             asked.append(wrench_of(paper_vehicle, signals.thrust_command).torque_B.z)
             change = sign * ((asked[-1 - delay] - asked[-1]) / (4.0 * paper_vehicle.torque_ratio))
             late = Command(signals.thrust_command + change, zeros())
             numbers, held = loop.plant_numbers(parameters), loop.held(after)
-            state = after._replace(plant=loop.plant.step(state.plant, late, held, k * T, numbers, T))
+            state = after._replace(plant=loop.plant.step(state.plant, late, held, k * period, numbers, period))
             yaws.append(abs(signals.attitude.z))
-        half = round(0.5 / T)
+        half = round(0.5 / period)
         return max(yaws[half : 2 * half]), max(yaws[-half:])
 
     early, late = swing(math.floor(0.85 * whole))
@@ -332,10 +334,9 @@ def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle:
     assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"])).text()
 
 
-def test_a_report_on_an_unstable_loop_says_so(paper_vehicle: Vehicle) -> None:
-    report = trim_report(paper_vehicle, PythonController(Spring(k1=3000.0, k2=3.0)), period=T)
-    assert "not stable in hover" in "".join(report.warnings)
-    assert "Margins: none" in report.text()
+def test_a_report_on_an_unstable_loop_says_so(unstable: TrimReport) -> None:
+    assert "not stable in hover" in "".join(unstable.warnings)
+    assert "Margins: none" in unstable.text()
 
 
 WRONG: list[dict[str, object]] = [

@@ -125,7 +125,7 @@ def test_golden_flight(name: str) -> None:
 
 
 def test_flights_in_a_batch_equal_flights_alone() -> None:
-    base = rf.load_scenario("paper-set-point", SHORT)
+    base = rf.load_scenario("paper-set-point", {"duration": 0.1, "controller": "smc"})
     scenarios = [rf.neighbour(base, seed=i) for i in range(3)]
     together = rf.fly_all(scenarios, engine="python")
     alone = rf.fly(scenarios[1], engine="python")

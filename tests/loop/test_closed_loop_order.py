@@ -24,13 +24,13 @@ PERIOD = 0.01
 TRUTH = [k for k, name in enumerate(OWN.rows) if name.partition(".")[0] in ("position", "velocity", "attitude")]
 
 
-def flown(substeps: int, fault_time: float = 0.3, **tables: Any) -> Array:
-    """Position, velocity and attitude at all sampling instants of 0.6 s."""
+def flown(substeps: int, fault_time: float = 0.15, **tables: Any) -> Array:
+    """Position, velocity and attitude at all sampling instants of 0.3 s."""
     scenario = scenario_from(
         {
             "name": "order",
             "vehicle": "paper",
-            "duration": 0.6,
+            "duration": 0.3,
             "period": PERIOD,
             "step": PERIOD / substeps,
             "start": {"position": [0.1, 0.2, 0.0], "attitude": [0.2, -0.3, 0.4], "body_rates": [0.5, 1.0, -0.5]},
@@ -79,6 +79,6 @@ def test_gusts_keep_the_order() -> None:
 
 def test_a_fault_inside_a_step_costs_the_order() -> None:
     """Why faults have to set in on a boundary: the test above can fail."""
-    errors, slopes = orders(fault_time=0.3 + PERIOD * 0.3)
+    errors, slopes = orders(fault_time=0.15 + PERIOD * 0.3)
     assert slopes.min() < 2.0
     assert errors[-1] > 1e-6

@@ -19,22 +19,22 @@ CONTEXT = Context(VEHICLE, T)
 
 
 def test_a_loss_acts_after_the_lag_at_once_and_takes_thrust_not_speed():
-    plant = plant_of(faults=[fault("step", rotor=3, time=1.8, loss=0.35)])
+    plant = plant_of(faults=[fault("step", rotor=3, time=0.18, loss=0.35)])
     thrust = PerRotor(4.0, 4.1, 4.2, 4.3)
-    before, seen = fly(plant, VEHICLE, thrust, 1799)
+    before, seen = fly(plant, VEHICLE, thrust, 179)
     parameters = numbers_of(plant, VEHICLE)
     np.testing.assert_allclose(array(seen.thrust), array(thrust), rtol=1e-12)
-    at, then = fly(plant, VEHICLE, thrust, 1800)
+    at, then = fly(plant, VEHICLE, thrust, 180)
     np.testing.assert_allclose(array(then.thrust), [4.0, 4.1, 4.2 * 0.65, 4.3], rtol=1e-12)
     np.testing.assert_allclose(array(then.rotor_speed), array(seen.rotor_speed), rtol=1e-12)
     np.testing.assert_allclose(array(then.loss), [0.0, 0.0, 0.35, 0.0], atol=1e-15)
     np.testing.assert_allclose(array(at.rotors), array(before.rotors), rtol=1e-12)
-    # In the step from 1.799 s nothing is felt, in that from 1.8 s the whole loss is.
+    # In the step from 0.179 s nothing is felt, in that from 0.18 s the whole loss is.
     bare = plant_of()
-    sound = step(bare, before, Command(thrust, zeros()), 1799 * T, numbers_of(bare, VEHICLE))
+    sound = step(bare, before, Command(thrust, zeros()), 179 * T, numbers_of(bare, VEHICLE))
     assert array(at.body).tolist() == array(sound.body).tolist()
-    after = step(plant, at, Command(thrust, zeros()), 1800 * T, parameters)
-    gained = truth_of(plant, after, 1801 * T, parameters).state.v_W.z - then.state.v_W.z
+    after = step(plant, at, Command(thrust, zeros()), 180 * T, parameters)
+    gained = truth_of(plant, after, 181 * T, parameters).state.v_W.z - then.state.v_W.z
     assert gained < -0.35 * 4.2 / VEHICLE.mass * T * 0.5
 
 

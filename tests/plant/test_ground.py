@@ -29,9 +29,14 @@ WEIGHT = HUMMINGBIRD.mass * HUMMINGBIRD.gravity
 
 
 def fall(
-    vehicle: Vehicle, model: str, steps: int, settings: dict[str, float] | None = None, **start: Vec3
+    vehicle: Vehicle,
+    model: str,
+    steps: int,
+    settings: dict[str, float] | None = None,
+    period: float = 0.001,
+    **start: Vec3,
 ) -> tuple[Plant, list[Any]]:
-    """A vehicle with rotors at rest above ground; the truth every millisecond."""
+    """A vehicle with rotors at rest above ground; the truth after every step."""
     plant = plant_of(model, ground=part(GROUND, "level", **(settings or {})))
     parameters = numbers_of(plant, vehicle)
     held = held_by(plant, parameters)
@@ -39,8 +44,8 @@ def fall(
     state = plant.initial(*given.values(), PerRotor.all(0.0), parameters)
     seen = []
     for k in range(steps):
-        seen.append(truth_of(plant, state, 0.001 * k, parameters))
-        state = plant.step(state, STILL, held, 0.001 * k, parameters, 0.001)
+        seen.append(truth_of(plant, state, period * k, parameters))
+        state = plant.step(state, STILL, held, period * k, parameters, period)
     return plant, seen
 
 
@@ -50,7 +55,7 @@ def fall(
 def test_it_comes_to_rest_level_with_the_weight_balanced(name: str, model: str) -> None:
     vehicle = load_vehicle(name).vehicle
     start = {"attitude": Vec3(0.12, -0.08, 0.3), "v_W": Vec3(0.3, -0.2, 0.0), "omega_B": Vec3(0.0, 0.0, 0.5)}
-    _, seen = fall(vehicle, model, 1500, **start)
+    _, seen = fall(vehicle, model, 600, period=0.0025, **start)
     end = seen[-1]
     weight = vehicle.mass * vehicle.gravity
     assert end.ground_force == pytest.approx(weight, rel=1e-3)
@@ -100,13 +105,16 @@ def test_touching_a_steep_wall_of_force_keeps_the_integrator_accurate() -> None:
 def test_friction_stops_a_slide_where_coulomb_says() -> None:
     """v^2 / (2 mu g), started at the depth of rest; the smoothed slip lengthens it by little."""
     vehicle = HUMMINGBIRD._replace(linear_drag=0.0)
-    _, seen = fall(vehicle, "rigid_body", 500, p_W=Vec3(0.0, 0.0, -0.002), v_W=Vec3(0.5, 0.0, 0.0))
+    _, seen = fall(vehicle, "rigid_body", 250, period=0.002, p_W=Vec3(0.0, 0.0, -0.002), v_W=Vec3(0.5, 0.0, 0.0))
     assert seen[-1].state.p_W.x == pytest.approx(0.25 / (2.0 * 0.6 * 9.81), rel=0.1)
 
 
 def test_above_the_ground_it_is_as_without() -> None:
     """Not a bit differs while nothing touches, and a flight without ground has no state of it."""
-    short = {"duration": 0.3, "on_fault": "continue", "fault.0.time": 0.1, "fault.1.time": 0.1}
+    short = {
+        "duration": 0.3, "on_fault": "continue", "fault.0.time": 0.1, "fault.1.time": 0.1,
+        "period": 0.005, "step": 0.005, "controller": {"kind": "smc", "preset": "none"},
+    }  # fmt: skip
     found = [
         rf.fly("land-after-fault", settings={**short, **extra}, engine="python").data
         for extra in ({}, {"ground": -100.0})
@@ -151,7 +159,7 @@ def test_bare_settings_are_the_gear_that_its_docstring_names() -> None:
 @pytest.mark.parametrize("height", [-3.0, 0.0, 0.21])
 def test_it_stands_at_the_height_of_the_settings(height: float) -> None:
     settings = {"height": height}
-    _, seen = fall(HUMMINGBIRD, "rigid_body", 800, settings, p_W=Vec3(0.0, 0.0, height + 0.02))
+    _, seen = fall(HUMMINGBIRD, "rigid_body", 400, settings, period=0.002, p_W=Vec3(0.0, 0.0, height + 0.02))
     assert seen[-1].state.p_W.z == pytest.approx(height - 0.002, abs=1e-5)
     ground = part(GROUND, "level", **settings)
     assert ground.height(ground.parameters(Context(HUMMINGBIRD, 0.001))) == height
@@ -163,7 +171,7 @@ def test_it_stands_at_the_height_of_the_settings(height: float) -> None:
 @pytest.mark.parametrize("name", vehicle_names())
 def test_it_sinks_as_far_as_the_settings_say_whatever_the_vehicle(name: str, sag: float) -> None:
     vehicle = load_vehicle(name).vehicle
-    _, seen = fall(vehicle, "rigid_body", 1000, {"sag": sag}, p_W=Vec3(0.0, 0.0, 0.0))
+    _, seen = fall(vehicle, "rigid_body", 200, {"sag": sag}, period=0.002, p_W=Vec3(0.0, 0.0, 0.0))
     assert seen[-1].state.p_W.z == pytest.approx(-sag, rel=0.01)
 
 

@@ -24,7 +24,7 @@ NO_DRAG = VEHICLE._replace(linear_drag=0.0)
 @pytest.mark.parametrize("model", MODELS)
 def test_free_fall(model):
     v0 = Vec3(1.0, -2.0, 3.0)
-    _, truth = fly(plant_of(model), NO_DRAG, PerRotor.all(0.0), 1000, v=v0, attitude=Vec3(0.3, -0.4, 0.5))
+    _, truth = fly(plant_of(model), NO_DRAG, PerRotor.all(0.0), 200, period=5e-3, v=v0, attitude=Vec3(0.3, -0.4, 0.5))
     np.testing.assert_allclose(array(truth.state.p_W), [1.0, -2.0, 3.0 - 0.5 * 9.81], atol=1e-11)
     np.testing.assert_allclose(array(truth.state.v_W), [1.0, -2.0, 3.0 - 9.81], atol=1e-11)
     np.testing.assert_allclose(array(truth.state.q_WB.euler()), [0.3, -0.4, 0.5], atol=1e-12)
@@ -32,7 +32,7 @@ def test_free_fall(model):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_hover_is_an_equilibrium(model):
-    _, truth = fly(plant_of(model), VEHICLE, hover_thrust(VEHICLE), 2000, attitude=Vec3(0.0, 0.0, 1.0))
+    _, truth = fly(plant_of(model), VEHICLE, hover_thrust(VEHICLE), 400, period=5e-3, attitude=Vec3(0.0, 0.0, 1.0))
     m = truth.state
     np.testing.assert_allclose(array((m.p_W, m.v_W, m.omega_B)), 0.0, atol=1e-12)
     np.testing.assert_allclose(array(m.q_WB.euler()), [0.0, 0.0, 1.0], atol=1e-14)
@@ -55,9 +55,9 @@ def test_in_constant_wind_the_vehicle_ends_up_drifting_with_the_air(model):
     vehicle, velocity = VEHICLE._replace(linear_drag=4.0), (-3.33, 1.36, 0.5)
     plant = plant_of(model, wind("constant", velocity_W=velocity))
     tau = vehicle.mass / 4.0
-    for steps in (100, 2000):
-        _, truth = fly(plant, vehicle, hover_thrust(vehicle), steps, period=0.01)
-        expected = np.array(velocity) * (1.0 - math.exp(-steps * 0.01 / tau))
+    for steps in (50, 500):
+        _, truth = fly(plant, vehicle, hover_thrust(vehicle), steps, period=0.02)
+        expected = np.array(velocity) * (1.0 - math.exp(-steps * 0.02 / tau))
         np.testing.assert_allclose(array(truth.state.v_W), expected, atol=1e-8)
     np.testing.assert_allclose(array(truth.state.v_W), velocity, atol=1e-8)
 
@@ -146,9 +146,9 @@ def test_a_mean_velocity_is_that_of_winds_that_push_by_nothing_else():
 
 
 def test_commands_beyond_the_limits_are_limited():
-    _, high = fly(plant_of(), VEHICLE, PerRotor.all(100.0), 1000, start=hover_thrust(VEHICLE))
+    _, high = fly(plant_of(), VEHICLE, PerRotor.all(100.0), 200, period=5e-3, start=hover_thrust(VEHICLE))
     np.testing.assert_allclose(array(high.thrust), VEHICLE.thrust_max, rtol=1e-12)
-    _, low = fly(plant_of(), VEHICLE, PerRotor.all(-5.0), 1000, start=hover_thrust(VEHICLE))
+    _, low = fly(plant_of(), VEHICLE, PerRotor.all(-5.0), 200, period=5e-3, start=hover_thrust(VEHICLE))
     np.testing.assert_allclose(array(low.thrust), VEHICLE.thrust_min, atol=1e-12)
 
 

@@ -64,6 +64,17 @@ def module_name(path: Path) -> str:
 MODULES = {module_name(path): path for path in FILES}
 
 
+@functools.cache
+def text_of(path: Path) -> str:
+    return path.read_text()
+
+
+@functools.cache
+def tree_of(path: Path) -> ast.Module:
+    """Parsed once, for all tests: nobody changes it."""
+    return ast.parse(text_of(path))
+
+
 def imports(tree: ast.AST, module: str, path: Path) -> Iterator[str]:
     """Full names of all that is imported, relative imports resolved; of `from a import b` the module: a.b, or a."""
     for node in ast.walk(tree):
@@ -78,10 +89,11 @@ def imports(tree: ast.AST, module: str, path: Path) -> Iterator[str]:
             yield from (name if name in MODULES else base for name in full)
 
 
-def graph() -> dict[str, set[str]]:
+@functools.cache
+def graph() -> dict[str, frozenset[str]]:
     """Which of our modules each of our modules imports."""
     return {
-        module: {name for name in imports(ast.parse(path.read_text()), module, path) if name in MODULES} - {module}
+        module: frozenset(name for name in imports(tree_of(path), module, path) if name in MODULES) - {module}
         for module, path in MODULES.items()
     }
 
@@ -103,7 +115,8 @@ def test_belief_never_reaches_truth() -> None:
     assert inner >= {"estimation", "diagnosis", "response", "control", "allocation", "prediction", "rotor_model"}
     for start in edges:
         if start.startswith(tuple(f"rotorfault.{part}" for part in BELIEF)):
-            seen, todo = set(), [start]
+            seen: set[str] = set()
+            todo = [start]
             while todo:
                 seen |= (new := edges[todo.pop()] - seen)
                 todo += new
@@ -112,10 +125,10 @@ def test_belief_never_reaches_truth() -> None:
 
 
 def test_no_import_cycle() -> None:
-    edges = graph()
-    for module in edges:  # a package's __init__ counts as imported by whoever imports a module of it
-        parents = {name.rpartition(".")[0] for name in edges[module]}
-        edges[module] |= {p for p in parents & set(MODULES) if not module.startswith(p)} - {"rotorfault"}
+    edges = {}
+    for module, used in graph().items():  # a package's __init__ counts as imported by whoever imports a module of it
+        parents = {name.rpartition(".")[0] for name in used}
+        edges[module] = used | ({p for p in parents & set(MODULES) if not module.startswith(p)} - {"rotorfault"})
     done: set[str] = set()
 
     def visit(module: str, path: tuple[str, ...]) -> None:
@@ -132,9 +145,7 @@ def test_no_import_cycle() -> None:
 @pytest.mark.parametrize("path", FILES, ids=module_name)
 def test_an_import_inside_a_function_is_listed_with_its_reason(path: Path) -> None:
     module = module_name(path)
-    functions = [
-        n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)
-    ]
+    functions = [n for n in ast.walk(tree_of(path)) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {name for function in functions for name in imports(function, module, path)}
     if module in COMMANDS:
         assert inside
@@ -144,7 +155,7 @@ def test_an_import_inside_a_function_is_listed_with_its_reason(path: Path) -> No
 
 def test_modules_are_loaded_by_name_only_where_the_name_is_data() -> None:
     def names(path: Path) -> set[str]:
-        nodes = list(ast.walk(ast.parse(path.read_text())))
+        nodes = list(ast.walk(tree_of(path)))
         imported = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
         return {node.attr for node in nodes if isinstance(node, ast.Attribute)} | imported
 
@@ -176,7 +187,7 @@ def texts(nodes: list[ast.expr]) -> list[str]:
 @pytest.mark.parametrize("path", FILES, ids=module_name)
 def test_number_types_and_compiler_are_known_in_few_places(path: Path) -> None:
     """The equations know neither heyoka nor CasADi nor LLVM; NumPy they know as one number type among others."""
-    place, used = path.relative_to(SOURCE), libraries(ast.parse(path.read_text()), module_name(path), path)
+    place, used = path.relative_to(SOURCE), libraries(tree_of(path), module_name(path), path)
     for library, homes in HOMES.items():
         if not {place.as_posix(), place.parts[0]} & set(homes):
             assert library not in used, library
@@ -196,7 +207,7 @@ def test_libraries_are_seen_however_they_are_named() -> None:
     asked = "if importlib.util.find_spec('heyoka') is None:\n    raise InputError('needs heyoka')"
     assert "heyoka" not in libraries(ast.parse(asked), "rotorfault.plant.plant", Path("plant.py"))
     used = {
-        place: libraries(ast.parse((SOURCE / place).read_text()), "rotorfault", SOURCE / place)
+        place: libraries(tree_of(SOURCE / place), "rotorfault", SOURCE / place)
         for place in ("maths/scalar.py", "engine/taylor.py", "engine/native.py")
     }
     assert used["maths/scalar.py"] >= {"heyoka", "casadi"}
@@ -246,7 +257,7 @@ def needless_gates(tree: ast.Module) -> list[int]:
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_only_what_uses_heyoka_asks_for_it(path: Path) -> None:
     """What needs the compiled engine asks for llvmlite; heyoka has wheels for Linux only, and tests would be lost."""
-    assert not needless_gates(ast.parse(path.read_text()))
+    assert not needless_gates(tree_of(path))
 
 
 def test_needless_gates_are_seen() -> None:
@@ -273,13 +284,13 @@ def test_needless_gates_are_seen() -> None:
 
 
 def test_files_stay_short() -> None:
-    lengths = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in [*FILES, *OTHERS]}
+    lengths = {path.relative_to(ROOT): len(text_of(path).splitlines()) for path in [*FILES, *OTHERS]}
     assert {place.parts[0] for place in lengths} == {"src", *FOLDERS}
     assert not {str(place): lines for place, lines in lengths.items() if lines > 400}
 
 
 def test_every_module_says_what_it_is_for() -> None:
-    assert not [name for name, path in MODULES.items() if not ast.get_docstring(ast.parse(path.read_text()))]
+    assert not [name for name, path in MODULES.items() if not ast.get_docstring(tree_of(path))]
 
 
 def test_the_tree_names_no_machine() -> None:
@@ -287,4 +298,4 @@ def test_the_tree_names_no_machine() -> None:
     kept = [*FILES, *SOURCE.rglob("*.toml"), *map(ROOT.joinpath, ("pyproject.toml", "constraints.txt", "Makefile"))]
     hosts = "|".join(("pypi" + r"\.org", "python" + "hosted", r"file:/" + "/", "/" + r"home/\w"))
     for path in kept:
-        assert not re.search(hosts, path.read_text()), path
+        assert not re.search(hosts, text_of(path)), path

@@ -73,7 +73,11 @@ def load(place: str, what: str) -> object:
     if not source or not name.isidentifier():
         raise InputError(f"{what} '{place}'; allowed: FILE.py:NAME or package.module:NAME")
     try:
-        module = _file_module(Path(source), f"{what} '{place}'") if source.endswith(".py") else importlib.import_module(source)
+        module = (
+            _file_module(Path(source), f"{what} '{place}'")
+            if source.endswith(".py")
+            else importlib.import_module(source)
+        )
     except InputError:
         raise
     except Exception as error:

@@ -103,7 +103,7 @@ def check(path: Path, allow_code: bool = False) -> str:
         from rotorfault.results import dataset
 
         data = dataset.read_netcdf(path)
-        scenario = scenario_from(dataset.configuration(data, path), str(path), allow_code)
+        scenario = scenario_from(dataset.configuration(data.attrs, path), str(path), allow_code)
         return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
     text = read_text(path)
     if path.suffix != ".toml":

@@ -7,10 +7,11 @@ that a flight can be repeated from its file alone.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import h5netcdf
 import xarray as xr
 
 from rotorfault.base.errors import InputError
@@ -18,6 +19,7 @@ from rotorfault.loop.recorded import LoopSignals
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
 
 OLD_FORMAT = "rotorfault-flight-1"
+Content = TypeVar("Content")
 
 ATTRIBUTES = ("scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "scores")
 """Attributes that the summary of a flight needs."""
@@ -52,7 +54,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     InputError
         If it is missing, unreadable, truncated, or no flight of this program.
     """
-    data = _opened(Path(path))
+    data = _from(Path(path), _dataset)
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
         raise InputError(
@@ -64,18 +66,28 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     return data
 
 
-def _opened(path: Path) -> xr.Dataset:
-    """Any file that xarray reads, in memory."""
+def _from(path: Path, read: Callable[[Path], Content]) -> Content:
+    """What is read of any file that xarray reads."""
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a flight.nc that 'rotorfault fly' wrote")
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as opened:
-            data = opened.load()
+        return read(path)
     except Exception as error:
         # h5py and xarray raise a dozen kinds for files that are truncated or no HDF5 at all.
         reason = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: cannot be read as a flight ({reason}); fly it again") from None
-    return data
+
+
+def _dataset(path: Path) -> xr.Dataset:
+    """All of it, in memory."""
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        return opened.load()
+
+
+def _attributes(path: Path) -> dict[str, Any]:
+    """What is said of the whole flight. The signals take twenty times as long to read."""
+    with h5netcdf.File(path, "r") as opened:
+        return dict(opened.attrs)
 
 
 def read_configuration(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -86,10 +98,10 @@ def read_configuration(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]
     InputError
         If it is missing, unreadable, truncated, or no flight of this program.
     """
-    data = _opened(Path(path))
-    if data.attrs.get("format") not in (FORMAT, OLD_FORMAT):
-        raise InputError(f"{path}: attribute 'format' is {data.attrs.get('format')!r}; allowed: '{FORMAT}'")
-    return configuration(data, path), dict(data.attrs)
+    attributes = _from(Path(path), _attributes)
+    if attributes.get("format") not in (FORMAT, OLD_FORMAT):
+        raise InputError(f"{path}: attribute 'format' is {attributes.get('format')!r}; allowed: '{FORMAT}'")
+    return configuration(attributes, path), attributes
 
 
 def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
@@ -110,10 +122,10 @@ def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
     return data
 
 
-def configuration(data: xr.Dataset, path: str | Path) -> dict[str, Any]:
+def configuration(attributes: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
     """The scenario's tables that a flight file holds."""
     try:
-        tables: dict[str, Any] = json.loads(data.attrs["configuration"])
+        tables: dict[str, Any] = json.loads(attributes["configuration"])
     except (KeyError, json.JSONDecodeError) as error:
         raise InputError(f"{path}: attribute 'configuration' is missing or damaged ({error})") from None
     return tables

@@ -31,7 +31,7 @@ from rotorfault.autopilot.control.cascade import (
     filtered,
     limited_force,
 )
-from rotorfault.engine import load_engine
+from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble, assemble_all
 from rotorfault.maths.geometry import Vec3, zeros
@@ -108,7 +108,7 @@ def test_command_filter_starts_at_the_measured_attitude(name: str) -> None:
 def flown(tables: dict[str, Any]) -> dict[str, Array]:
     """Rows of one scenario's flight by name."""
     batch = assemble(scenario_from({"name": "test", "vehicle": "paper"} | tables, "test"))
-    recording = load_engine("python")(batch, no_watch)
+    recording = load_engine("simd" if have_simd() else "python")(batch, no_watch)
     return dict(zip(batch.loop.layout.rows, recording.signals[:, :, 0].T, strict=True))
 
 
@@ -119,8 +119,8 @@ def test_six_inputs_is_labelled_and_acts() -> None:
     assert "unphysical" in (field.description or "")
     task = {
         "duration": 4.0,
-        "period": 0.005,
-        "step": 0.005,
+        "period": 0.01,
+        "step": 0.01,
         "reference": {"kind": "set_point", "position": [0.5, -0.5, 0.0]},
     }
     tilts = {}
@@ -141,7 +141,9 @@ def attitude_pair(yaw: float, start: tuple[float, float, float], controller: str
             "vehicle": "paper",
             "plant": "rigid_body",
             "duration": 16.0,  # the slowest tuned yaw loop has a pole at 0.5 rad/s
-            "period": 0.002,
+            "period": 0.004,
+            "step": 0.004,
+            "record_period": 0.012,
             "start": {"attitude": list(start), "body_rates": [1.0, -1.0, 0.5]},
             "reference": {"kind": "set_point", "position": [0.0, 0.0, 0.0], "yaw": yaw},
             "controller": controller,

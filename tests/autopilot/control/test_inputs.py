@@ -81,11 +81,11 @@ def scenario(**tables: Any) -> Scenario:
         {
             "name": "test",
             "vehicle": vehicle,
-            "duration": 0.3,
+            "duration": 0.2,
             "period": PERIOD,
             "step": PERIOD,
             "reference": {"kind": "set_point", "position": [0.3, -0.2, 0.1]},
-            "fault": [{"kind": "step", "rotor": 2, "time": 0.1, "loss": LOSS}],
+            "fault": [{"kind": "step", "rotor": 2, "time": 0.05, "loss": LOSS}],
             "diagnosis": "oracle",
         }
         | tables,
@@ -126,7 +126,7 @@ def test_expected_thrust_is_that_of_sound_rotors(engine: str) -> None:
     np.testing.assert_allclose(expected * (1.0 - signals["controller.loss"]), signals["thrust"], atol=2e-6)
     assert np.ptp(expected, axis=0).min() > 0.1
     # With rotors that are weaker than believed it stays what is believed, once the start is forgotten.
-    weak = flown(Witness(), engine, mismatch={"rotor_gain": 0.9}, fault=[])
+    weak = flown(Witness(), engine, mismatch={"rotor_gain": 0.9}, fault=[], duration=0.3)
     np.testing.assert_allclose(weak["thrust"][-20:], 0.9 * weak["controller.expected"][-20:], rtol=1e-5)
 
 
@@ -168,14 +168,14 @@ def test_in_steady_wind_it_feels_the_wind_until_it_leans_into_it() -> None:
 
 def test_in_free_fall_it_feels_nothing() -> None:
     """Rotors stopped, no drag: what is left falls with the lag of the rotors."""
-    signals = flown(Limp(), fault=[], diagnosis="off", mismatch={"linear_drag": 0.0}, duration=1.0)
+    signals = flown(Limp(), fault=[], diagnosis="off", mismatch={"linear_drag": 0.0}, duration=0.7)
     bandwidth = scenario().vehicle.vehicle.rotor_bandwidth
     time = np.arange(len(signals["specific_force"])) * PERIOD
     np.testing.assert_allclose(
         signals["specific_force"][:, 2], 9.81 * np.exp(-bandwidth * time), rtol=1e-3, atol=1e-12
     )
     assert np.abs(signals["specific_force"][-1]).max() < 1e-12
-    assert signals["velocity"][-1, 2] < -9.0
+    assert signals["velocity"][-1, 2] < -6.0
 
 
 def test_standing_on_the_ground_it_feels_its_weight_again() -> None:
@@ -197,7 +197,7 @@ def test_along_an_accelerating_reference_it_is_acceleration_less_gravity(plant: 
         wind="paper",
         fault=[],
         reference={"kind": "sinusoid", "amplitude": [0.5, 0.3, 0.2], "frequency": [2.0, 3.0, 4.0]},
-        duration=1.5,
+        duration=0.8,
     )
     acceleration = (signals["velocity"][2:] - signals["velocity"][:-2]) / (2.0 * PERIOD)
     felt = np.array(

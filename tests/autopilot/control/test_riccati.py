@@ -104,7 +104,8 @@ def test_iterated_solution_has_stable_poles_and_positive_cost(thousand: Any) -> 
 
 
 def test_agrees_with_scipy(thousand: Any) -> None:
-    for arguments, problem, gain in thousand:
+    """Which takes its time: every fourth of them."""
+    for arguments, problem, gain in thousand[::4]:
         dense = dense_problem(*arguments)
         P = solve_dense(dense)
         assert relative(cost_matrix(problem, gain), P) < 1e-8

@@ -35,7 +35,7 @@ def scenario(**tables: Any) -> Scenario:
         {
             "name": "test",
             "vehicle": "paper",
-            "duration": 0.5,
+            "duration": 0.4,
             "period": 0.005,
             "step": 0.005,
             "start": {"position": [0.2, -0.1, 0.3], "attitude": [0.2, -0.1, 0.3]},
