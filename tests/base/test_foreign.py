@@ -119,7 +119,7 @@ def test_a_change_is_seen_whatever_the_clock_says(folder: Path, monkeypatch: pyt
 @pytest.mark.parametrize(
     ("place", "reason"),
     {
-        "none.py:Part": r"controller: no such file .*none\.py; allowed: FILE\.py:NAME",
+        "none.py:Part": r"controller '.*none\.py:Part': no such file .*none\.py; allowed: FILE\.py:NAME",
         "own_part.py:": r"controller 'own_part\.py:'; allowed: FILE\.py:NAME or package\.module:NAME",
         ":Part": r"controller ':Part'; allowed: FILE\.py:NAME or package\.module:NAME",
         "own_part.py:two words": "allowed: FILE",
