@@ -30,7 +30,8 @@ from rotorfault.base.progress import Say
 from rotorfault.engine import load_engine
 from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.engine.taylor import fly_taylor
-from rotorfault.flight.assembly import assemble, initial_state, start_of
+from rotorfault.flight.assembly import assemble
+from rotorfault.flight.beginning import initial_state, start_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import leaf_names
 from rotorfault.scenario.scenario import Scenario, scenario_from

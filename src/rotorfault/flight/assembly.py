@@ -15,14 +15,13 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
-from rotorfault.engine.batch import Batch, columns
-from rotorfault.engine.noise import Stream, normals
+from rotorfault.engine.batch import Batch
 from rotorfault.engine.program import same_code
-from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, Start
+from rotorfault.flight.beginning import initial_state, start_of
+from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import Vec3
-from rotorfault.maths.records import flatten, record_type, unflatten
+from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Context, Record
 from rotorfault.model.slot import Slot
 from rotorfault.plant.ground import GROUND
@@ -35,6 +34,10 @@ from rotorfault.scenario.slots import SLOTS
 R = TypeVar("R")
 Own = Mapping[Slot[Any], AnyBlock]
 """Parts that fly in place of a scenario's, such as a controller that a user hands in."""
+
+
+Objects = tuple[list[Any], NDArray[np.intp]]
+"""Different objects, and which of them each flight has."""
 
 
 class Group(NamedTuple):
@@ -196,64 +199,6 @@ def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> A
     return rows
 
 
-def start_of(scenario: Scenario) -> Start:
-    """Where a flight begins."""
-    s = scenario.start
-    return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
-
-
-def first_normals(loop: ClosedLoop, seeds: tuple[tuple[int, int], ...]) -> tuple[Any, Any]:
-    """Standard normal numbers for `initial` and for the first step, by slot, each of shape (N,).
-
-    A part that says nothing of the start gets the numbers of the first step there too.
-    """
-    steps: dict[str, Stream] = {}
-    starts: dict[str, Stream] = {}
-    for slot, part in loop.each():
-        if part.normals:
-            steps[slot.name] = starts[slot.name] = Stream(part.normals, slot.words(part)[0])
-        if part.first_normals is not None:
-            starts[slot.name] = Stream(part.first_normals, slot.words(part)[1])
-
-    def drawn(name: str, streams: dict[str, Stream]) -> Any:
-        numbers = (tuple(normals(seeds, stream, 0, 1)[0]) if stream.width else () for stream in streams.values())
-        return record_type(name, tuple(streams))(*numbers)
-
-    return drawn("FirstNormals", starts), drawn("Normals", steps)
-
-
-def initial_state(
-    loop: ClosedLoop, start: Start, reference: Array, seeds: tuple[tuple[int, int], ...], parameters: LoopParameters
-) -> LoopState:
-    """State before the first step, for one flight or, with leaves of N numbers, for N."""
-    drive = loop.drive()
-    wanted, own = unflatten((drive.reference, drive.own), reference[0].tolist())
-    at_start, first_step = first_normals(loop, seeds)
-    drive = drive._replace(reference=wanted, own=own, normals=first_step)
-    # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
-    # must begin the same alone and in any batch.
-    many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=at_start)
-    state = loop.initial(many, drive, parameters)
-    return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
-
-
-def begins_alike(loop: ClosedLoop, scenario: Scenario, batch: Batch) -> bool:
-    """Whether a flight begins the same in another loop, which knows its numbers from the parameters alone.
-
-    Parameters
-    ----------
-    loop : ClosedLoop
-        With the same parts, of other settings.
-    scenario : Scenario
-        Of the flight.
-    batch : Batch
-        Of the flight.
-    """
-    state = initial_state(loop, start_of(scenario), batch.reference, batch.seeds, batch.parameters)
-    one, other = (np.array(flatten(record), dtype=float) for record in (state, batch.state))
-    return np.array_equal(one, other, equal_nan=True)
-
-
 @final
 class _Assembly:
     """Builds the batch of some flights of a group.
@@ -273,14 +218,15 @@ class _Assembly:
         self.columns = {key: column[part] for key, column in group.columns.items()}
         self.seeds = tuple((int(seed), 0) for seed in group.seeds[part])
         self.count = len(self.flights)
-        self._objects: dict[str, tuple[list[Any], NDArray[np.intp]]] = {}
+        self._objects: dict[str, Objects] = {}
+        self._told: dict[bool, Objects] = {}
         self._tables = self.scenario.as_tables() if self.columns else {}
 
     def parameters(self, loop: ClosedLoop) -> LoopParameters:
         """Numbers of the flights, without those of scoring."""
         return LoopParameters(
-            vehicle=self.numbers(("vehicle", "mismatch"), lambda v, m: m.applied(v.vehicle)),
-            belief=self.numbers(("vehicle",), lambda v: v.vehicle),
+            vehicle=self._record((self._contexts(truth=True),), lambda context: context.vehicle),
+            belief=self._record((self._contexts(truth=False),), lambda context: context.vehicle),
             parts=loop.record(*(self._part_numbers(slot) for slot in loop.parts)),
             period=self.scenario.period,
         )
@@ -308,44 +254,55 @@ class _Assembly:
 
     def _part_numbers(self, slot: Slot[Any]) -> Any:
         """The numbers of the part of a slot, or of its parts."""
-        period = self.scenario.period
         # What a part of the truth is told of is the true vehicle.
-        about = ("vehicle", "mismatch") if slot.side == "truth" else ("vehicle",)
+        about = self._contexts(slot.side == "truth")
 
-        def context(vehicle: Any, mismatch: Any = None) -> Context:
-            numbers = vehicle.vehicle if mismatch is None else mismatch.applied(vehicle.vehicle)
-            return Context(numbers, period)
-
-        def record(part: Part[AnyBlock], *vehicle: Any) -> Record:
-            return part.make().parameters(context(*vehicle))  # type: ignore[no-any-return]
+        def record(part: Part[AnyBlock], context: Context) -> Record:
+            return part.make().parameters(context)  # type: ignore[no-any-return]
 
         if slot in self.own:
-            return self.numbers(about, lambda *vehicle: self.own[slot].parameters(context(*vehicle)))
+            return self._record((about,), self.own[slot].parameters)
         if slot.many:
             names = [f"{slot.name}.{i}" for i in range(len(self.scenario.all(slot)))]
-            return tuple(self.numbers((name, *about), record) for name in names)
-        return self.numbers((slot.name, *about), record)
+            return tuple(self._record((self.objects(name), about), record) for name in names)
+        return self._record((self.objects(slot.name), about), record)
+
+    def _contexts(self, truth: bool) -> Objects:
+        """What parts are told of the flight, once for each different vehicle."""
+        if truth not in self._told:
+            period = self.scenario.period
+            vehicles = self.objects("vehicle"), *((self.objects("mismatch"),) if truth else ())
+            pairs, inverse = _different(vehicles)
+            made = []
+            for pair in pairs:
+                vehicle, *mismatch = pair
+                made.append(Context(mismatch[0].applied(vehicle.vehicle) if mismatch else vehicle.vehicle, period))
+            self._told[truth] = made, inverse
+        return self._told[truth]
 
     def numbers(self, names: Sequence[str], record: Callable[..., Any]) -> Any:
         """A record of numbers that depends on some parts: floats where they do not vary, else arrays (N,)."""
-        parts = [self.objects(name) for name in names]
-        varying = [inverse for objects, inverse in parts if len(objects) > 1]
-        if not varying:
-            return record(*(objects[0] for objects, _ in parts))
-        pairs, inverse = np.unique(np.stack([inverse for _, inverse in parts]), axis=1, return_inverse=True)
-        made = [record(*(objects[i] for (objects, _), i in zip(parts, pair, strict=True))) for pair in pairs.T]
-        rows, place = np.array([[float(leaf) for leaf in flatten(one)] for one in made]).T, inverse.reshape(-1)
+        return self._record([self.objects(name) for name in names], record)
+
+    @staticmethod
+    def _record(parts: Sequence[Objects], record: Callable[..., Any]) -> Any:
+        """The same for objects that the flights have."""
+        pairs, place = _different(parts)
+        made = [record(*pair) for pair in pairs]
+        if len(made) == 1:
+            return made[0]
+        rows = np.array([[float(leaf) for leaf in flatten(one)] for one in made]).T
         # What is the same in all stays one number: a hundred thousand flights are held in memory.
         same = (rows == rows[:, :1]).all(axis=1)
         return unflatten(made[0], [float(row[0]) if one else row[place] for row, one in zip(rows, same, strict=True)])
 
-    def objects(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
+    def objects(self, name: str) -> Objects:
         """The different objects of a part of the scenario, and which of them each flight has."""
         if name not in self._objects:
             self._objects[name] = self._made(name)
         return self._objects[name]
 
-    def _made(self, name: str) -> tuple[list[Any], NDArray[np.intp]]:
+    def _made(self, name: str) -> Objects:
         field, _, index = name.partition(".")
         keys = [key for key in self.columns if key == name or key.startswith(f"{name}.")]
         here = getattr(self.scenario, field)
@@ -371,6 +328,15 @@ class _Assembly:
                 raise
             made.append(one[int(index)] if index else one)
         return made, inverse.reshape(-1)
+
+
+def _different(parts: Sequence[Objects]) -> tuple[list[tuple[Any, ...]], NDArray[np.intp]]:
+    """Combinations of objects that flights have, and which of them each has."""
+    if all(len(objects) == 1 for objects, _ in parts):
+        return [tuple(objects[0] for objects, _ in parts)], parts[0][1]
+    pairs, inverse = np.unique(np.stack([inverse for _, inverse in parts]), axis=1, return_inverse=True)
+    made = [tuple(objects[i] for (objects, _), i in zip(parts, pair, strict=True)) for pair in pairs.T.tolist()]
+    return made, inverse.reshape(-1)
 
 
 def _copied(tables: Any) -> Any:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_own
 from rotorfault.engine.program import same_code
-from rotorfault.flight.assembly import Group, assemble, begins_alike, overridden
+from rotorfault.flight.assembly import Group, assemble, overridden
+from rotorfault.flight.beginning import begins_alike
 from rotorfault.scenario.overrides import override
 from rotorfault.scenario.part import Part
 from rotorfault.scenario.scenario import Scenario

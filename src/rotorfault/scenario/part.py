@@ -110,16 +110,15 @@ def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Pa
     if slot.shorthand is not None:
         value = slot.shorthand(value)
     table = {"kind": value} if isinstance(value, str) else value
-    names = list(slot.registry)
     if not isinstance(table, Mapping):
-        raise refusal("", f"got {value!r}; allowed: a table with 'kind', or a name: {', '.join(names)}")
+        raise refusal("", f"got {value!r}; allowed: a table with 'kind', or a name: {', '.join(slot.registry)}")
     if "kind" not in table and slot.default is not None:
         table = {"kind": slot.default, **table}
     if "kind" not in table:
-        raise refusal("kind", f"is missing; allowed: {', '.join(names)}")
+        raise refusal("kind", f"is missing; allowed: {', '.join(slot.registry)}")
     kind = table["kind"]
     if not isinstance(kind, str) or not (foreign.is_place(kind) or kind in slot.registry):
-        raise refusal("kind", unknown(slot.registry.sort, kind, names))
+        raise refusal("kind", unknown(slot.registry.sort, kind, list(slot.registry)))
     settings = {key: item for key, item in table.items() if key != "kind"}
     try:
         factory = _foreign(slot, kind, allow) if foreign.is_place(kind) else None

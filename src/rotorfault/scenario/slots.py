@@ -25,6 +25,7 @@ class Slots:
 
     def __init__(self, slots: tuple[Slot[Any], ...]) -> None:
         self._slots = list(slots)
+        self._named = {slot.name: slot for slot in slots}
         self.version = 0  # rises with every change
 
     def __iter__(self) -> Iterator[Slot[Any]]:
@@ -34,7 +35,7 @@ class Slots:
         return len(self._slots)
 
     def __contains__(self, name: object) -> bool:
-        return any(slot.name == name for slot in self._slots)
+        return name in self._named
 
     def __getitem__(self, name: str) -> Slot[Any]:
         """A slot by its name.
@@ -44,10 +45,9 @@ class Slots:
         InputError
             If there is none.
         """
-        for slot in self._slots:
-            if slot.name == name:
-                return slot
-        raise InputError(unknown("kind of part", name, [slot.name for slot in self._slots]))
+        if name not in self._named:
+            raise InputError(unknown("kind of part", name, [slot.name for slot in self._slots]))
+        return self._named[name]
 
     def insert(self, slot: Slot[Any], after: str) -> None:
         """Give a new kind of part its place, behind that of another.
@@ -62,11 +62,13 @@ class Slots:
             if word in words:
                 raise InputError(f"slot {slot.name}: stream {word} belongs to {words[word]}; allowed: another word")
         self._slots.insert(1 + self._slots.index(self[after]), slot)
+        self._named[slot.name] = slot
         self.version += 1
 
     def remove(self, slot: Slot[Any]) -> None:
         """Take a kind of part away again."""
         self._slots.remove(slot)
+        del self._named[slot.name]
         self.version += 1
 
 
