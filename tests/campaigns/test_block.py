@@ -87,7 +87,7 @@ def test_success_is_for_the_study_to_say_and_survival_is_not(success: tuple[str,
     """The first is far lighter than believed and flies away; the second sinks to the ground from just above it."""
     place = {f"{key}.position": (0.0, 0.0, 0.3) for key in ("start", "reference")}
     (away,) = rows_of(study_of([{"name": "mass", "values": [0.4]}], success, **{"fault.0.loss": 0.0}))
-    (down,) = rows_of(study_of([{"name": "loss", "values": [0.7]}], success, **place))
+    (down,) = rows_of(study_of([{"name": "loss", "values": [0.9]}], success, **place))
     assert (away["grade"], away["outcome"], away["survived"]) == ("drifted", "offset", True)
     assert (down["grade"], down["outcome"], down["survived"]) == ("controlled descent", "ground", False)
     assert (away["success"], down["success"]) == ("drifted" in success, "controlled descent" in success)

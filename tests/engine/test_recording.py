@@ -93,10 +93,10 @@ def test_a_lost_flight_is_data(engine: str) -> None:
 def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last record of a flight is the first one from its end on, whenever the engine notices the end."""
     falling = [
-        short(duration=1.25, record_period=0.035, sensors="ideal", fault=[fault])
+        short(duration=1.25, record_period=0.035, sensors="ideal", diagnosis="off", fault=[fault])
         for fault in (
             {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0},
-            {"kind": "step", "rotor": 2, "time": 0.1, "loss": 1.0},
+            {"kind": "step", "rotor": 2, "time": 0.25, "loss": 1.0},
         )
     ]
     both = run(assemble_all(falling), engine)

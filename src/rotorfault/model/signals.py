@@ -98,6 +98,7 @@ class Diagnosis(NamedTuple):
     flagged: PerRotor  # 1 where a fault is declared
     estimate: PerRotor  # raw estimated loss, before any decision
     residual: PerRotor  # N: estimated thrust less the thrust that a healthy rotor would give
+    test: PerRotor = PerRotor.all(0.0)  # N: least thrust of a sound rotor to command, to see whether it gives any
 
 
 class Command(NamedTuple):

@@ -94,7 +94,7 @@ def watch(
             direct_acceleration_W=zeros(),
             elapsed=T if k else 0.0,
         )
-        inputs = DiagnosisInputs(now, expectation, PerRotor.all(math.nan), vehicle)
+        inputs = DiagnosisInputs(now, expectation, command, vehicle)
         memory = made.initial(inputs, parameters) if memory is None else memory
         memory, told, _ = made.step(memory, inputs, parameters, T)
         rows.append([arr(told.residual), -arr(told.residual) / arr(thrust), arr(told.estimate), arr(told.flagged)])
@@ -114,7 +114,7 @@ def test_poles_are_where_they_were_asked_for(form: str, period: float, p: float,
     made = observer(form, (p, q))
     numbers = made.parameters(Context(VEHICLE, period))
     A = np.array([[1.0, numbers.carry], [0.0, numbers.decay]])
-    L = np.array([[numbers.gain_rate], [numbers.gain_deviation]])
+    L = np.array([[numbers.dynamics.gain_rate], [numbers.dynamics.gain_deviation]])
     # Current observer: its error after a measurement obeys (I - L C) A, with the eigenvalues of A (I - L C).
     found = np.linalg.eigvals(A @ (np.eye(2) - L @ np.array([[1.0, 0.0]])))
     np.testing.assert_allclose(np.sort(found), np.sort(np.exp([-p * period, -q * period])), atol=1e-9)
@@ -174,12 +174,12 @@ TILTS = [zeros(), Vec3(0.5, 0.0, 0.0), Vec3(-0.4, 0.7, 2.0), Vec3(0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("tilt", TILTS, ids=["level", "roll", "all", "pitch"])
-@pytest.mark.parametrize("losses", [SOUND, (0.25, 0.0, 0.35, 0.0), (0.0, 0.45, 0.0, 0.0), (0.1, 0.2, 0.0, 0.3)])
+@pytest.mark.parametrize("losses", [SOUND, (0.25, 0.0, 0.35, 0.0), (0.0, 0.45, 0.0, 0.0), (0.0, 0.2, 0.0, 0.3)])
 def test_injected_is_unbiased_at_any_tilt(tilt: Vec3, losses: tuple[float, float, float, float]) -> None:
     seen = watch(observer(), losses, tilt, steps=200)
     np.testing.assert_allclose(seen.share[-1], losses, atol=1e-5)
     np.testing.assert_allclose(seen.estimate[-1], losses, atol=1e-5)
-    np.testing.assert_array_equal(seen.flagged[-1], arr(losses) > 0.12)
+    np.testing.assert_array_equal(seen.flagged[-1], arr(losses) > 0.1)
 
 
 def test_a_healthy_rotor_hardly_notices_the_others() -> None:
@@ -233,6 +233,13 @@ def test_vertical_wind_is_nobodys_fault(wind_z: float) -> None:
     # A true loss in this wind is still found, against the rotors that are sound.
     windy = watch(observer(), (0.0, 0.35, 0.0, 0.0), wind_z=wind_z, steps=150)
     assert windy.flagged[-1].tolist() == [0.0, 1.0, 0.0, 0.0]
+
+
+def test_three_rotors_that_lose_alike_are_taken_for_one_that_gives_too_much() -> None:
+    """The price of not blaming three sound rotors for one that runs away."""
+    seen = watch(observer(), (0.2, 0.2, 0.0, 0.2))
+    assert seen.flagged[-1].tolist() == [0.0, 0.0, 1.0, 0.0]
+    np.testing.assert_allclose(seen.estimate[-1], 0.0, atol=1e-5)
 
 
 def test_an_equal_loss_of_all_is_the_price() -> None:

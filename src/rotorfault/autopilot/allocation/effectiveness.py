@@ -23,7 +23,8 @@ The order has a price that the report names: a rotor that is dead, with no tilt 
 rest as well. Two dead rotors on different arms then leave no thrust at all in level flight.
 
 A rotor whose effectiveness is below `effectiveness_min` counts as dead: it is held at c_min (0 on most vehicles) and
-what it still gives there, lo_i, is its whole interval. So nothing is ever divided by a number near 0.
+what it still gives there, lo_i, is its whole interval. So nothing is ever divided by a number near 0. While the
+diagnosis tests a rotor, the thrust of the test takes the place of c_min.
 """
 
 from __future__ import annotations
@@ -85,20 +86,21 @@ def allocated(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiven
     wrench : Wrench
         Demanded thrust [N] and torque [N m, body axes].
     diagnosis : Diagnosis
-        Only the loss is used.
+        The loss, and the least thrust of rotors under test.
     effectiveness_min : scalar
         Below it a rotor counts as dead.
     """
     effect = effect_of(vehicle, diagnosis.loss)
     dead = diagnosis.loss.map(lambda loss: less(1.0 - loss, effectiveness_min))
-    low = effect * vehicle.thrust_min
+    least = diagnosis.test.map(lambda f: maximum(f / vehicle.rotor_gain, vehicle.thrust_min))
+    low = effect * least
     high = dead.map(select, low, effect * vehicle.thrust_max)
 
     thrust = rotor_thrusts(attainable_nearest(pair_demand(vehicle, wrench), low, high)).map(clip, low, high)
 
     # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
     divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
-    command = limited(vehicle, (thrust - low) / divisor + vehicle.thrust_min)
+    command = limited(vehicle, (thrust - low) / divisor + least)
     return account(vehicle, wrench, diagnosis, command)
 
 

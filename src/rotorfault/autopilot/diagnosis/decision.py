@@ -1,25 +1,33 @@
-"""From residuals to a decision: which rotors are at fault, and how much thrust they have lost.
+r"""From residuals to a decision: which rotors are at fault, and how much thrust they have lost.
 
-A vertical wind, or a wrong mass, looks exactly like an equal loss on all four rotors. Deviations are therefore
-taken relative to the best rotor, the one with the largest (most positive) deviation: with r_i the residual in N,
+With r_i the residual [N] of rotor i (thrust estimated less that of a sound rotor) and F_i the thrust of a sound one:
 
-    loss_i = clip(-(r_i - max_j r_j) / max(F_i, 5 % of F_max), 0, 1)
+**Reference.** A vertical wind, or a wrong mass, looks exactly like an equal loss on all four rotors. Residuals are
+therefore taken relative to the *second best* rotor's, r_s, which is sound as long as two rotors are. Where one rotor
+gives too much (stuck high, run away), the other three are equal, and that one is at fault and not they. The price: an
+equal loss on all four is nobody's fault, one on three is laid to the fourth.
 
-so the best rotor is never blamed, and an equal loss on all four is nobody's fault. The price: a true equal loss on
-all four is not seen, which no observer of the body's motion could tell from wind either.
+**Threshold.** A rotor is *suspected* while
 
-An inertia that is wrong by a share e makes the model miss a share e of every torque, which looks like lost thrust on
-one rotor and gained thrust on its partner. The threshold therefore adapts to what the rotors are doing: with the
-spread s_i = |F_i - F_partner| + |S12 - S34|/2 of the expected thrusts in N (its peak, forgotten with the time
-constant ``memory``), rotor i is *suspected* while
+.. math:: |r_s - r_i| > T_i, \qquad T_i^2 = \max(threshold\,\max(F_i, F_{hover}),\; n\,\sigma)^2 + E_i^2
 
-    max_j r_j - r_i > threshold F_i + uncertainty s_i.
+with the noise sigma and the model's error E of `rotorfault.autopilot.diagnosis.model_error`: that beside any other
+rotor or, where a rotor falls behind its partner by as much and none gives too much, that beside the partner if it is
+smaller. A thrust that is missing is never weighed against less than the thrust of hover: what hardly pulls can hardly
+show a loss.
 
-In calm flight the spread is small and the plain threshold remains.
+**Flag.** A rotor is flagged once it has been suspected for ``persistence``, and cleared once its residual has stayed
+below ``clear_threshold`` for ``clear_persistence``; the time counts as far as its thrust could have shown a loss,
+:math:`\min(F_i/F_{hover}, 1)^2`.
 
-A rotor is flagged once it has been suspected for ``persistence`` seconds on end, and cleared once its loss has
-stayed below ``clear_threshold`` for ``clear_persistence``. Believed losses of flagged rotors are smoothed,
-weighted by squared thrust (a rotor that hardly pulls says little about its loss).
+**Belief.** :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i -
+threshold`, which is 0 in steady hover. The believed loss follows it with the time constant ``smoothing`` as far as
+it lies outside of that margin, and within it more slowly, by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too
+much is flagged with a loss of 0: no reallocation makes it give less.
+
+**Test.** A rotor that is believed to have lost more than half may be held where it cannot show that it is sound. So
+it is tested, at once and every ``test_interval``: it gets ``test_thrust`` at least, for as long as lag and observer
+need. A dead rotor does not mind.
 """
 
 from __future__ import annotations
@@ -28,6 +36,7 @@ from typing import NamedTuple
 
 from pydantic import Field, model_validator
 
+from rotorfault.autopilot.diagnosis.model_error import Misstated, Shares
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import (
@@ -44,29 +53,36 @@ from rotorfault.maths.scalar import (
     minimum,
     negated,
     select,
+    sqrt,
 )
 from rotorfault.model.signals import Diagnosis
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, hover_thrust
 
 # Of F_max: below it a thrust is no measure for a loss. Our choice: an error of 1 % of F_max then reads as a loss of
 # 0.2 at most.
 SMALL_THRUST = 0.05
+TESTED = 0.5  # believed loss above which a rotor is tested: more of it has gone than is left
 
 
 class DecisionSettings(Strict):
     """When a rotor counts as faulty."""
 
-    threshold: float = Field(default=0.12, gt=0.0, lt=1.0, description="loss above which a rotor is suspected")
-    uncertainty: float = Field(
-        default=0.15, ge=0.0, description="share by which torques may be mispredicted, inertia errors first of all"
+    threshold: float = Field(default=0.1, gt=0.0, lt=1.0, description="loss above which a rotor is suspected")
+    noise: float = Field(
+        default=5.5, ge=0.0, description="standard deviations of noise above which a rotor is suspected"
     )
-    memory: float = Field(default=0.03, gt=0.0, description="time constant of the spread's peak [s]")
+    inertia: float = Field(default=0.28, ge=0.0, description="share by which the believed inertia may be wrong")
+    bandwidth: float = Field(default=0.57, ge=0.0, description="share by which the believed bandwidth may be wrong")
     persistence: float = Field(default=0.008, ge=0.0, description="time above the threshold before it is flagged [s]")
     clear_threshold: float = Field(default=0.06, gt=0.0, lt=1.0, description="loss below which it may be cleared")
     clear_persistence: float = Field(default=0.2, gt=0.0, description="time below it before it is cleared [s]")
     smoothing: float = Field(
         default=0.025, ge=0.0, description="time constant of believed losses at hover thrust [s]; 0 for none"
     )
+    test_thrust: float = Field(
+        default=0.3, ge=0.0, lt=1.0, description="share of hover thrust by which a rotor is tested; 0 for no tests"
+    )
+    test_interval: float = Field(default=1.0, gt=0.0, description="time from one test to the next [s]")
 
     @model_validator(mode="after")
     def _ordered(self) -> DecisionSettings:
@@ -79,27 +95,58 @@ class DecisionParameters(NamedTuple):
     """Numbers of the decision."""
 
     threshold: Scalar
-    uncertainty: Scalar
-    memory: Scalar  # s
+    noise: Scalar
+    model: Shares
     persistence: Scalar  # s
     clear_threshold: Scalar
     clear_persistence: Scalar  # s
     smoothing: Scalar  # s
+    test_thrust: Scalar
+    test_interval: Scalar  # s
+    test_time: Scalar  # s: length of a test
 
 
 class DecisionMemory(NamedTuple):
     """Memory of the decision, per rotor."""
 
-    above: PerRotor  # s: time above the threshold
-    below: PerRotor  # s: time below the clearing threshold
+    suspected: PerRotor  # s: time beyond the threshold
+    below: PerRotor  # s: time below the clearing threshold, as far as its thrust could show a loss
     flagged: PerRotor  # 1 or 0
     smoothed: PerRotor  # smoothed loss
-    spread: PerRotor  # N: recent peak of the spread of expected thrusts
+    tested: PerRotor  # s: time since the last test began
 
 
-def decision_parameters(settings: DecisionSettings) -> DecisionParameters:
-    """Numbers of the settings as a record."""
-    return DecisionParameters(*(getattr(settings, name) for name in DecisionParameters._fields))
+class Evidence(NamedTuple):
+    """What is known of the rotors at one instant, in N."""
+
+    residual: PerRotor  # thrust estimated less that of a sound rotor
+    thrust: PerRotor  # of a sound rotor
+    model_error: Misstated  # N^2: squares of what a wrong model may show as missing thrust
+    noise: Scalar  # standard deviation of the difference of two residuals
+
+
+def decision_parameters(settings: DecisionSettings, test_time: float) -> DecisionParameters:
+    """Numbers of the settings as a record.
+
+    Parameters
+    ----------
+    settings : DecisionSettings
+    test_time : float, s
+        How long a rotor needs to show its thrust.
+    """
+    s = settings
+    return DecisionParameters(
+        s.threshold,
+        s.noise,
+        Shares(s.inertia, s.bandwidth),
+        s.persistence,
+        s.clear_threshold,
+        s.clear_persistence,
+        s.smoothing,
+        s.test_thrust,
+        s.test_interval,
+        test_time,
+    )
 
 
 def undecided() -> DecisionMemory:
@@ -108,8 +155,22 @@ def undecided() -> DecisionMemory:
     return DecisionMemory(none, none, none, none, none)
 
 
+def second_best(residual: PerRotor) -> Scalar:
+    """The second largest residual in N, which is a sound rotor's as long as two are sound.
+
+    Parameters
+    ----------
+    residual : PerRotor
+        N: estimated thrust less the thrust of a sound rotor.
+    """
+    r1, r2, r3, r4 = residual
+    # Of the two winners the lower one, or the loser of the higher one's pair.
+    runner_up = minimum(maximum(r1, r2), maximum(r3, r4))
+    return maximum(runner_up, maximum(minimum(r1, r2), minimum(r3, r4)))
+
+
 def relative_loss(residual: PerRotor, thrust: PerRotor, vehicle: Vehicle) -> PerRotor:
-    """Loss of each rotor relative to the best one, in [0, 1].
+    """Loss of each rotor relative to the second best one, in [0, 1].
 
     Parameters
     ----------
@@ -117,63 +178,90 @@ def relative_loss(residual: PerRotor, thrust: PerRotor, vehicle: Vehicle) -> Per
         N: estimated thrust less the thrust of a sound rotor.
     thrust : PerRotor
         N: thrust of a sound rotor.
+    vehicle : Vehicle
+        As believed.
     """
-    best = residual.reduce(maximum)
+    return _loss(second_best(residual), residual, thrust, vehicle)
+
+
+def _loss(sound: Scalar, residual: PerRotor, thrust: PerRotor, vehicle: Vehicle) -> PerRotor:
     least = SMALL_THRUST * vehicle.thrust_max
-    return residual.map(lambda r, f: clip((best - r) / maximum(f, least), 0.0, 1.0), thrust)
-
-
-def spread_of(thrust: PerRotor) -> PerRotor:
-    """Spread s_i of expected thrusts in N: what torque errors scale with, seen from each rotor."""
-    first, second = absolute(thrust.r1 - thrust.r2), absolute(thrust.r3 - thrust.r4)
-    yaw = 0.5 * absolute(thrust.r1 + thrust.r2 - thrust.r3 - thrust.r4)
-    return PerRotor(first + yaw, first + yaw, second + yaw, second + yaw)
+    return residual.map(lambda r, f: clip((sound - r) / maximum(f, least), 0.0, 1.0), thrust)
 
 
 def decide(
-    memory: DecisionMemory,
-    residual: PerRotor,
-    thrust: PerRotor,
-    vehicle: Vehicle,
-    parameters: DecisionParameters,
-    dt: Scalar,
-) -> tuple[DecisionMemory, Diagnosis]:
-    """One sampling instant: residuals [N] and expected thrusts [N] to a belief."""
-    estimate = relative_loss(residual, thrust, vehicle)
-    hover = vehicle.mass * vehicle.gravity / (4.0 * vehicle.rotor_gain)
-    forget = exp(-dt / parameters.memory)
-    spread = memory.spread.map(lambda old, new: maximum(old * forget, new), spread_of(thrust))
-    # The extra threshold in units of loss, so that one comparison serves.
-    least = SMALL_THRUST * vehicle.thrust_max
-    extra = spread.map(lambda s, f: parameters.uncertainty * s / maximum(f, least), thrust)
+    memory: DecisionMemory, evidence: Evidence, vehicle: Vehicle, parameters: DecisionParameters, dt: Scalar
+) -> tuple[DecisionMemory, Diagnosis, PerRotor]:
+    """One sampling instant: what is known of the rotors becomes a belief.
+
+    Parameters
+    ----------
+    memory : DecisionMemory
+    evidence : Evidence
+    vehicle : Vehicle
+        As believed.
+    parameters : DecisionParameters
+    dt : scalar, s
+        Time since the last instant.
+
+    Returns
+    -------
+    memory : DecisionMemory
+    diagnosis : Diagnosis
+    threshold : PerRotor
+        In N, of what is missing.
+    """
+    p, sound = parameters, second_best(evidence.residual)
+    losses = _loss(sound, evidence.residual, evidence.thrust, vehicle)
+    hover = hover_thrust(vehicle).r1
+    nothing = 1e-9 * hover
+    noise = p.noise * evidence.noise
+    excess = evidence.residual.reduce(maximum) - sound
     # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
     half = 0.5 * dt
+    blend = select(less_equal(p.smoothing, 0.0), 1.0, 1.0 - exp(-dt / maximum(p.smoothing, 1e-9)))
+    small = p.test_thrust * hover
 
     def one(
-        loss: Scalar, f: Scalar, more: Scalar, above: Scalar, below: Scalar, flagged: Scalar, smoothed: Scalar
-    ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-        suspected = greater(loss, parameters.threshold + more)
-        above = select(suspected, above + dt, 0.0)
+        loss: Scalar, r: Scalar, partner: Scalar, f: Scalar, any_: Scalar, beside: Scalar, was: DecisionMemory
+    ) -> tuple[Scalar, ...]:
+        off, large = sound - r, maximum(f, hover)
+        base = maximum(p.threshold * large, noise)
+        # No pair is a measure while a rotor gives too much: what that does to the others is in no model.
+        behind, near = maximum(partner - r, 0.0), base * base + beside
+        comparable = both(greater(behind * behind, near), less(excess * excess, near))
+        threshold = sqrt(base * base + select(comparable, minimum(beside, any_), any_))
+        suspected = greater(absolute(off), threshold)
+        since = select(suspected, was.suspected + dt, 0.0)
+        raised = both(suspected, greater_equal(since, p.persistence - half))
+        shown = minimum(f / hover, 1.0)
+        shown = shown * shown
         # NaN counts as not below: it never clears a flag.
-        below = select(less(loss, parameters.clear_threshold), below + dt, 0.0)
-        raised = both(suspected, greater_equal(above, parameters.persistence - half))
-        cleared = both(greater_equal(below, parameters.clear_persistence - half), negated(raised))
-        now = select(raised, 1.0, select(cleared, 0.0, flagged))
-        weight = minimum(f * f / (hover * hover), 1.0)
-        blend = select(
-            less_equal(parameters.smoothing, 0.0), 1.0, 1.0 - exp(-dt * weight / maximum(parameters.smoothing, 1e-9))
-        )
-        # Between suspicion and flag the filter runs already, from the loss seen at the first suspicion.
-        fresh = both(negated(flagged), less_equal(above, 1.5 * dt))
-        smoothed = select(fresh, loss, smoothed + blend * (loss - smoothed))
-        return above, below, now, smoothed
+        below = select(less(absolute(off), p.clear_threshold * large), was.below + dt * shown, 0.0)
+        cleared = both(greater_equal(below, p.clear_persistence - half), negated(raised))
+        flagged = select(raised, 1.0, select(cleared, 0.0, was.flagged))
 
-    parts = [
-        one(*values)
-        for values in zip(
-            estimate, thrust, extra, memory.above, memory.below, memory.flagged, memory.smoothed, strict=True
-        )
-    ]
-    above, below, flagged, smoothed = (PerRotor.of(column) for column in zip(*parts, strict=True))
-    after = DecisionMemory(above, below, flagged, smoothed, spread)
-    return after, Diagnosis(loss=smoothed * flagged, flagged=flagged, estimate=estimate, residual=residual)
+        # Beyond all bounds where there is no thrust: what shows nothing changes nothing.
+        margin = maximum(threshold / maximum(f, nothing) - p.threshold, 0.0)
+        gap = loss - was.smoothed
+        open_ = clip(gap, -margin, margin)
+        # Between suspicion and flag the filter runs already, from the loss seen at the first suspicion.
+        fresh = both(negated(was.flagged), less_equal(since, 1.5 * dt))
+        followed = was.smoothed + blend * (gap - open_ + shown * open_)
+        smoothed = select(fresh, maximum(loss - margin, 0.0), followed)
+
+        doubted = both(flagged, greater(smoothed, TESTED))
+        again = greater_equal(was.tested, p.test_interval)
+        tested = select(doubted, select(again, 0.0, was.tested + dt), 0.0)
+        test = select(both(doubted, less(tested, p.test_time)), small, 0.0)
+        return threshold, test, since, below, flagged, smoothed, tested
+
+    before = (DecisionMemory(*values) for values in zip(*memory, strict=True))
+    r1, r2, r3, r4 = evidence.residual
+    partners = PerRotor(r2, r1, r4, r3)
+    known = (evidence.residual, partners, evidence.thrust, *evidence.model_error)
+    rows = zip(losses, *known, before, strict=True)
+    threshold, test, *after = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
+    decided = DecisionMemory(*after)
+    loss = decided.smoothed * decided.flagged
+    return decided, Diagnosis(loss, decided.flagged, losses, evidence.residual, test), threshold

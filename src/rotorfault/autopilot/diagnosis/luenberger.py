@@ -26,7 +26,7 @@ with L placed at :math:`e^{pT}` for the continuous poles p. Three forms of the m
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple, final
+from typing import Annotated, Literal, NamedTuple, final
 
 from pydantic import Field, field_validator
 
@@ -34,26 +34,38 @@ from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
     DecisionSettings,
+    Evidence,
     decide,
     decision_parameters,
     undecided,
 )
+from rotorfault.autopilot.diagnosis.model_error import (
+    Dynamics,
+    ModelErrorMemory,
+    follow,
+    misstated,
+    noise_gain,
+    noise_of,
+    nothing_shown,
+)
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
-from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, maximum
-from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.block import Context, Record
 from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.motion import drag_acceleration, torque_of_motion
 from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.slot import register
+from rotorfault.model.telemetry import NO_FRAME, Q
 from rotorfault.model.vehicle import wrench_of
 
 Form = Literal["injected", "linear", "lag_states"]
 # Of tilt, 78 degrees: below it the vertical balance hardly sees the thrust. Our choice: an innovation is amplified
 # fivefold at most.
 LEAST_COSINE = 0.2
+SHOWN = 4.0  # time constants until an exponential has shown 98 % of where it goes
 FASTEST_POLE = 30.0  # per sampling period: exp(-30) = 1e-13 is zero beside 1 but for rounding
 
 
@@ -81,9 +93,15 @@ class LuenbergerParameters(NamedTuple):
 
     carry: Scalar  # s: how a deviation acceleration adds to the rate over one period
     decay: Scalar  # what remains of a deviation over one period: 1 but for `lag_states`
-    gain_rate: Scalar  # innovation to rate
-    gain_deviation: Scalar  # 1/s, innovation to deviation acceleration
+    dynamics: Dynamics  # L_1, innovation to rate, and L_2, to deviation acceleration, and what follows from them
     decision: DecisionParameters
+
+
+class LuenbergerSignals(NamedTuple):
+    """What the observer records."""
+
+    threshold: Annotated[PerRotor, Q("N", NO_FRAME, "missing thrust above which a rotor is suspected")]
+    test: Annotated[PerRotor, Q("N", NO_FRAME, "least command, to see whether a rotor is dead")]
 
 
 class LuenbergerMemory(NamedTuple):
@@ -94,6 +112,7 @@ class LuenbergerMemory(NamedTuple):
     delta_z: Scalar  # m/s^2: deviation of thrust over mass
     delta_omega: Vec3  # rad/s^2: deviation of torque over inertia
     started: Scalar  # 0 before the first step, then 1
+    model_error: ModelErrorMemory
     decision: DecisionMemory
 
 
@@ -132,6 +151,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
     """Luenberger observer of thrust deviations with threshold and persistence."""
 
     Settings = LuenbergerSettings
+    Telemetry = LuenbergerSignals
 
     def parameters(self, context: Context) -> LuenbergerParameters:
         """Discrete model and gain.
@@ -152,20 +172,23 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         decay = math.exp(-w * period) if self.settings.form == "lag_states" else 1.0
         carry = (1.0 - decay) / w if self.settings.form == "lag_states" else period
         p, q = self.settings.poles
-        gain_rate, gain_deviation = place(carry, decay, (math.exp(-p * period), math.exp(-q * period)))
-        return LuenbergerParameters(
-            carry, decay, gain_rate, gain_deviation, decision_parameters(self.settings.decision)
-        )
+        gains = place(carry, decay, (math.exp(-p * period), math.exp(-q * period)))
+        dynamics = Dynamics(*gains, noise_gain(*gains, period), math.exp(-w * period))
+        test_time = SHOWN / w + SHOWN / min(p, q)
+        return LuenbergerParameters(carry, decay, dynamics, decision_parameters(self.settings.decision, test_time))
 
     def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
         """Start at the estimated rates without deviation."""
-        return LuenbergerMemory(inputs.estimate.v_W.z, inputs.estimate.omega_B, 0.0, zeros(), 0.0, undecided())
+        return LuenbergerMemory(
+            inputs.estimate.v_W.z, inputs.estimate.omega_B, 0.0, zeros(), 0.0, nothing_shown(), undecided()
+        )
 
     def step(
         self, memory: LuenbergerMemory, inputs: DiagnosisInputs, parameters: LuenbergerParameters, dt: Scalar
     ) -> tuple[LuenbergerMemory, Diagnosis, Record]:
         """One sampling instant."""
         vehicle, elapsed, now = inputs.vehicle, inputs.expectation.elapsed, inputs.estimate
+        dynamics = parameters.dynamics
         cosine, climb_change, omega_change = self._model(inputs)
         # At the first step nothing has elapsed: the deviations (zero) must not be carried either.
         carry = parameters.carry * memory.started
@@ -174,21 +197,27 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
-        delta_z = delta_z + parameters.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
-        delta_omega = delta_omega + innovation * parameters.gain_deviation
+        delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
+        delta_omega = delta_omega + innovation * dynamics.gain_deviation
         residual = nominal_inverse(vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega)))
-        decision, diagnosis = decide(
-            memory.decision, residual, inputs.expectation.thrust, vehicle, parameters.decision, elapsed
+        wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
+        evidence = Evidence(
+            residual,
+            inputs.expectation.thrust,
+            misstated(wrong, parameters.decision.model, vehicle),
+            noise_of(wrong, vehicle, dynamics),
         )
+        decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, elapsed)
         after = LuenbergerMemory(
-            climb=climb + parameters.gain_rate * innovation_z,
-            omega_B=omega_B + innovation * parameters.gain_rate,
+            climb=climb + dynamics.gain_rate * innovation_z,
+            omega_B=omega_B + innovation * dynamics.gain_rate,
             delta_z=delta_z,
             delta_omega=delta_omega,
             started=1.0,
+            model_error=wrong,
             decision=decision,
         )
-        return after, diagnosis, Nothing()
+        return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test)
 
     def _model(self, inputs: DiagnosisInputs) -> tuple[Scalar, Scalar, Vec3]:
         """(cosine of the tilt, vertical acceleration, angular acceleration) of a sound vehicle, period's mean."""
