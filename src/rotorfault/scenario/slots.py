@@ -24,18 +24,17 @@ class Slots:
     """Slots in order, by name."""
 
     def __init__(self, slots: tuple[Slot[Any], ...]) -> None:
-        self._slots = list(slots)
-        self._named = {slot.name: slot for slot in slots}
+        self._slots = {slot.name: slot for slot in slots}
         self.version = 0  # rises with every change
 
     def __iter__(self) -> Iterator[Slot[Any]]:
-        return iter(self._slots)
+        return iter(self._slots.values())
 
     def __len__(self) -> int:
         return len(self._slots)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._named
+        return name in self._slots
 
     def __getitem__(self, name: str) -> Slot[Any]:
         """A slot by its name.
@@ -45,9 +44,9 @@ class Slots:
         InputError
             If there is none.
         """
-        if name not in self._named:
-            raise InputError(unknown("kind of part", name, [slot.name for slot in self._slots]))
-        return self._named[name]
+        if name not in self._slots:
+            raise InputError(unknown("kind of part", name, list(self._slots)))
+        return self._slots[name]
 
     def insert(self, slot: Slot[Any], after: str) -> None:
         """Give a new kind of part its place, behind that of another.
@@ -57,18 +56,18 @@ class Slots:
         InputError
             If there is no such other, or a word of the new slot's streams of random numbers belongs to one already.
         """
-        words = {word: other.name for other in self._slots for word in other.streams or ()}
+        words = {word: other.name for other in self for word in other.streams or ()}
         for word in slot.streams or ():
             if word in words:
                 raise InputError(f"slot {slot.name}: stream {word} belongs to {words[word]}; allowed: another word")
-        self._slots.insert(1 + self._slots.index(self[after]), slot)
-        self._named[slot.name] = slot
+        slots = list(self)
+        slots.insert(1 + slots.index(self[after]), slot)
+        self._slots = {each.name: each for each in slots}
         self.version += 1
 
     def remove(self, slot: Slot[Any]) -> None:
         """Take a kind of part away again."""
-        self._slots.remove(slot)
-        del self._named[slot.name]
+        del self._slots[slot.name]
         self.version += 1
 
 
