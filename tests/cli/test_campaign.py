@@ -105,7 +105,10 @@ def test_a_replay_writes_the_whole_flight(folder: Path) -> None:
         (["replay", "campaigns/tiny"], "give the flight by --flight ID, or by --cell and --variant"),
         (["replay", "campaigns/tiny", "--flight", "99999999"], "there is no flight 99999999"),
         (["replay", "campaigns/tiny", "--cell", "1"], "--cell needs --variant"),
-        (["replay", "campaigns/tiny", "--cell", "1", "--variant", "smx"], "there is no variant 'smx'"),
+        (
+            ["replay", "campaigns/tiny", "--cell", "1", "--variant", "smx"],
+            "'smx'; did you mean 'smc'",
+        ),
         (["replay", "campaigns/tiny", "--cell", "77", "--variant", "smc"], "there is no cell 77"),
     ],
 )

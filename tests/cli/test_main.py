@@ -221,7 +221,7 @@ def edited(tmp_path: Path, what: str, old: str, new: str) -> str:
 @pytest.mark.parametrize(
     ("what", "old", "new", "named"),
     [
-        ("scenario", "rotor = 2", "rotor = 5", ["mine.toml", "fault.0", "rotor"]),
+        ("scenario", "rotor = 2", "rotor = 5", ["mine.toml", "fault 1: rotor", "key fault.0.rotor"]),
         ("scenario", "duration = 12.0", "duration = nan", ["mine.toml", "duration"]),
         ("scenario", "duration = 12.0", "duratoin = 12.0", ["mine.toml", "duratoin", "duration"]),
         ("scenario", "step = 0.001", "step = 0.01", ["mine.toml", "step", "sampling period"]),

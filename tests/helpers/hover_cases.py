@@ -21,19 +21,20 @@ def one(rotor: int, loss: float) -> PerRotor:
 
 
 def random_case(rng: np.random.Generator, floor: float = 0.3) -> tuple[Vehicle, PerRotor, Vec3]:
-    """Any two opposite pairs, limits, gain, sense of rotation; losses often 0 or 1; wind from anywhere."""
+    """Two opposite pairs in any order, limits, gain, sense of rotation; losses often 0 or 1; wind from anywhere."""
     angle = rng.uniform(0.0, 2.0 * math.pi)
     angles = angle, angle + rng.choice([0.5 * math.pi, rng.uniform(0.3, 2.8)])
     arms = [rng.uniform(0.05, 0.6) * np.array([math.cos(a), math.sin(a)]) for a in angles]
     r = [arms[0], -arms[0], arms[1], -arms[1]]
+    order = rng.permutation(4)
     mass, sign = rng.uniform(0.02, 5.0), rng.choice([-1.0, 1.0])
     gain = rng.uniform(0.6, 1.4)
     most = mass * 9.81 * rng.uniform(1.05, 4.0) / (4.0 * gain)
     vehicle = PAPER._replace(
         mass=mass,
-        rotor_x=PerRotor.of(float(p[0]) for p in r),
-        rotor_y=PerRotor.of(float(p[1]) for p in r),
-        rotor_yaw_sign=PerRotor(sign, sign, -sign, -sign),
+        rotor_x=PerRotor.of(float(r[k][0]) for k in order),
+        rotor_y=PerRotor.of(float(r[k][1]) for k in order),
+        rotor_yaw_sign=PerRotor.of(sign if k < 2 else -sign for k in order),
         torque_ratio=rng.uniform(0.003, 0.05),
         rotor_gain=gain,
         thrust_max=most,

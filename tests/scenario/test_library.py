@@ -99,7 +99,7 @@ def test_code_that_the_user_names_may_run(tmp_path: Path, form: str) -> None:
     }
     path = write(tmp_path, HEAD + 'controller = "smc"\n' + POINT)
     if form == "list":
-        with pytest.raises(InputError, match=r"fault\.0: fault '.*:Breeze' is a wind"):  # it has been loaded
+        with pytest.raises(InputError, match=r"fault 1: fault '.*:Breeze' is a wind"):  # it has been loaded
             load_scenario(path, overrides[form])
         return
     assert load_scenario(path, overrides[form]).as_tables()

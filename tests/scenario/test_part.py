@@ -52,7 +52,12 @@ def test_a_table_without_kind_is_of_the_default_kind_where_there_is_one() -> Non
         (WIND, {"kind": 3}, "wind: kind: unknown wind '3'"),
         (WIND, 3, "wind: got 3; allowed: a table with 'kind', or a name: none, constant, paper, dryden"),
         (WIND, {"kind": "paper", "scale": -1.0}, r"wind: scale: must be greater than or equal to 0; got -1\.0"),
-        (WIND, {"kind": "paper", "velocity_W": [0, 0, 0]}, r"wind: velocity_W: unknown key \(allowed: scale\)"),
+        (
+            WIND,
+            {"kind": "paper", "velocity_W": [0, 0, 0]},
+            r"wind: velocity_W: unknown key \(allowed: scale\), as this",
+        ),
+        (WIND, {"kind": "none", "wind_at_6m": 3.0}, "wind: wind_at_6m: .*allowed: none.* kind 'dryden'"),
         (WIND, {"kind": "none", "preset": "tuned"}, "wind: preset: unknown key"),
         (CONTROLLER, {"kind": "roismc", "preset": "tund"}, "controller: preset: unknown preset 'tund'; did you mean"),
         (CONTROLLER, {"kind": "roismc", "preset": 3}, "controller: preset: got 3; allowed: the name of a preset"),

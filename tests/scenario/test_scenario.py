@@ -69,13 +69,19 @@ def test_parts_are_had_by_slot_and_by_name() -> None:
         ({"duration": math.nan}, "duration: .*finite"),
         ({"seed": -1}, "seed: .*greater than or equal to 0; got -1"),
         ({"seed": 1.5}, r"seed: .*integer.*; got 1\.5"),
-        ({"start": {"position": [0.0, 0.0]}}, r"start\.position\.2: is missing"),
+        (
+            {"start": {"position": [0.0, 0.0]}},
+            r"start\.position, entry 3: is missing.*\(key start\.position\.2\)",
+        ),
         ({"start": {"speed": 1.0}}, r"start\.speed: unknown key"),
         ({"mismatch": {"mass": 0.0}}, r"mismatch\.mass: must be greater than 0; got 0\.0"),
         ({"vehicle": "papr"}, "vehicle: unknown vehicle 'papr'; did you mean 'paper'"),
         ({"vehicle": 3}, "vehicle: got 3; allowed: name of a vehicle"),
         ({"fault": STEP}, "fault: must be a valid"),
-        ({"fault": [STEP, {**STEP, "rotor": 5}]}, r"fault\.1\.rotor: must be less than or equal to 4; got 5"),
+        (
+            {"fault": [STEP, {**STEP, "rotor": 5}]},
+            r"fault 2: rotor: must be less .* 4; got 5 \(key fault\.1\.rotor\)",
+        ),
     ],
 )
 def test_what_is_wrong_gets_one_line_with_file_and_key(tables: dict[str, Any], message: str) -> None:

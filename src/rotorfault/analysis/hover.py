@@ -4,8 +4,8 @@ Rotor i gives any thrust in [lo_i, hi_i] = (1 - loss_i) k [c_min, c_max]. Rest n
 
 .. math:: N = |m g e_z - k_d w_W| = \sqrt{(m g - k_d w_z)^2 + k_d^2 (w_x^2 + w_y^2)}
 
-along an axis tilted into the wind. In the sums and differences of the rotor pairs (see `mixer`) roll and pitch are
-in balance if and only if D12 = D34 = 0, so the rotors of a pair give the same:
+along an axis tilted into the wind. In the sums and differences of the rotor pairs, numbered in their order (see
+`mixer`), roll and pitch are in balance if and only if D12 = D34 = 0, so the rotors of a pair give the same:
 
 .. math:: F_1 = F_2 = f_{12} \in [\max(lo_1, lo_2), \min(hi_1, hi_2)] = [a, b], \quad
           F_3 = F_4 = f_{34} \in [c, d] \text{ alike}
@@ -27,6 +27,7 @@ from flight before the fault; for torque to spare see `torque_reserve`.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ from rotorfault.maths.scalar import (
     negated,
     select,
 )
+from rotorfault.model.mixer import from_pairs, in_pairs
 from rotorfault.model.vehicle import Vehicle
 
 # Of the greatest thrust of a rotor: at a critical loss, known but for rounding, hover is possible.
@@ -105,7 +107,7 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
         carries the vehicle away), and is 0 where the wind carries more than the weight: that takes flight upside
         down.
     """
-    low, high = _thrust_ranges(vehicle, loss)
+    low, high = (in_pairs(vehicle, ends) for ends in _thrust_ranges(vehicle, loss))
     needed, upright = _needed(vehicle, wind_W)
     room = _room(vehicle)
     a, b = maximum(low.r1, low.r2), minimum(high.r1, high.r2)
@@ -175,18 +177,17 @@ def critical_loss(
         If there is no such rotor.
     """
     own = _index(rotor)
-    low, high = (list(ends) for ends in _thrust_ranges(vehicle, PerRotor.all(0.0) if loss is None else loss))
+    low, high = _thrust_ranges(vehicle, PerRotor.all(0.0) if loss is None else loss)
     needed, upright = _needed(vehicle, wind_W)
     room = _room(vehicle)
-    # Rotors 1, 2 and 3, 4 are partners: index 0, 1 and 2, 3.
-    partner, (first, second) = own ^ 1, (2, 3) if own < 2 else (0, 1)
-    c, d = maximum(low[first], low[second]), minimum(high[first], high[second])
+    partner_low, c = _beside(vehicle, own, low, maximum)
+    partner_high, d = _beside(vehicle, own, high, minimum)
     if yaw:
         f = needed * 0.25
-        least, most = maximum(low[partner], c), minimum(high[partner], d)
+        least, most = maximum(partner_low, c), minimum(partner_high, d)
     else:
-        f = maximum(needed * 0.5 - d, low[partner])
-        least, most = f, minimum(high[partner], needed * 0.5 - c)
+        f = maximum(needed * 0.5 - d, partner_low)
+        least, most = f, minimum(partner_high, needed * 0.5 - c)
     strongest = vehicle.rotor_gain * vehicle.thrust_max
     others = both(less_equal(c, d + room), both(less_equal(least, f + room), less_equal(f, most + room)))
     possible = both(upright, both(others, less_equal(f, strongest + room)))
@@ -249,9 +250,10 @@ def torque_reserve(vehicle: Vehicle, loss: PerRotor, yaw: bool = True, wind_W: V
     Vec3, N m, body axes
         The torques about the other axes are 0. Without yaw z is 0. All 0 where hover is not possible.
     """
-    low, high = _thrust_ranges(vehicle, loss)
+    low, high = (in_pairs(vehicle, ends) for ends in _thrust_ranges(vehicle, loss))
     needed, upright = _needed(vehicle, wind_W)
-    x1, x3, y1, y3 = vehicle.rotor_x.r1, vehicle.rotor_x.r3, vehicle.rotor_y.r1, vehicle.rotor_y.r3
+    x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)
+    y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
     det = x1 * y3 - x3 * y1
     # As in `mixer.pair_demand`; both signs of a torque count, so only relative signs matter.
     roll, pitch = (-x3 / det, x1 / det), (-y3 / det, y1 / det)
@@ -365,6 +367,15 @@ def _thrust_ranges(vehicle: Vehicle, loss: PerRotor) -> tuple[PerRotor, PerRotor
     """Least and largest thrust of each rotor in N."""
     effect = loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
     return effect * vehicle.thrust_min, effect * vehicle.thrust_max
+
+
+def _beside(vehicle: Vehicle, own: int, ends: PerRotor, fold: Callable[..., Scalar]) -> tuple[Scalar, Scalar]:
+    """For a rotor, by its place from 0, the value of its partner, and that of the other pair folded into one."""
+    r1, r2, r3, r4 = in_pairs(vehicle, ends)
+    first, second = fold(r1, r2), fold(r3, r4)
+    beside = (PerRotor(r2, r1, r4, r3), PerRotor(second, second, first, first))
+    partner, other = (list(from_pairs(vehicle, values))[own] for values in beside)
+    return partner, other
 
 
 def _needed(vehicle: Vehicle, wind_W: Vec3 | None) -> tuple[Scalar, Scalar]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from rotorfault.base.errors import InputError, nearest
+from rotorfault.base.errors import InputError, choices, nearest
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -43,7 +44,7 @@ class Strict(BaseModel):
             allowed = [name if field.alias is None else field.alias for name, field in cls.model_fields.items()]
             for key, value in data.items():
                 if key not in allowed and key not in cls.model_fields:
-                    raise refusal(str(key), f"unknown key{nearest(key, allowed)} (allowed: {', '.join(allowed)})")
+                    raise refusal(str(key), f"unknown key{nearest(key, allowed)} ({choices(allowed)})")
                 # pydantic would take true for 1.
                 if isinstance(value, bool) and cls.model_fields[key].annotation in (float, int, float | None):
                     raise refusal(str(key), f"got {str(value).lower()}; allowed: a number")
@@ -63,7 +64,7 @@ def refusal(key: str, message: str) -> PydanticCustomError:
     return PydanticCustomError(_OWN, "{message}", {"message": message, "key": key})
 
 
-def explain(error: ValidationError, where: str) -> str:
+def explain(error: ValidationError, where: str, data: Any = None, keys: bool = False) -> str:
     """The first thing that is wrong, in one line: ``where: key.path: message; got X``.
 
     Parameters
@@ -71,6 +72,11 @@ def explain(error: ValidationError, where: str) -> str:
     error : pydantic.ValidationError
     where : str
         The file, or what the configuration is for when it comes from Python.
+    data : optional
+        What was checked, for the names of things in lists.
+    keys : bool
+        Whether the user may have set values by dotted keys, which count from 0: then the key of something in a list
+        stands at the end.
 
     Returns
     -------
@@ -79,7 +85,38 @@ def explain(error: ValidationError, where: str) -> str:
     """
     details = error.errors(include_url=False)
     more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
-    return f"{_one_line(details[0], where)}{more}"
+    path, message = _parts(details[0])
+    text = ": ".join(part for part in (where, in_words(path, data), message) if part)
+    key = f" (key {'.'.join(path)})" if keys and any(part.isdigit() for part in path) else ""
+    return f"{text}{key}{more}"
+
+
+def in_words(keys: Sequence[str], data: Any = None) -> str:
+    """A path of keys as people count: ``rotor 2 ('rear left'): x``, ``start.position, entry 3``.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Those of lists are indices from 0.
+    data : optional
+        Where the path leads through; things in lists that have a ``name`` are called by it.
+    """
+    words, here = "", data
+    for place, key in enumerate(keys):
+        if isinstance(here, Mapping):
+            here = here.get(key)
+        elif isinstance(here, (list, tuple)) and key.isdigit() and int(key) < len(here):
+            here = here[int(key)]
+        else:
+            here = None
+        if not (key.isdigit() and words):
+            words += f"{'' if not words else ': ' if keys[place - 1].isdigit() else '.'}{key}"
+        elif place + 1 < len(keys) or isinstance(here, Mapping):
+            name = here.get("name") if isinstance(here, Mapping) else None
+            words += f" {int(key) + 1}" + (f" ({name!r})" if isinstance(name, str) and name else "")
+        else:
+            words += f", entry {int(key) + 1}"
+    return words
 
 
 def passed_on(error: ValidationError) -> PydanticCustomError:
@@ -90,18 +127,13 @@ def passed_on(error: ValidationError) -> PydanticCustomError:
     return refusal(".".join(keys), f"{message}{more}")
 
 
-def _one_line(detail: ErrorDetails, where: str) -> str:
-    keys, message = _parts(detail)
-    return ": ".join(part for part in (where, ".".join(keys), message) if part)
-
-
 def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
     """Path of the key that is wrong, and what is wrong with it."""
     keys = [str(part) for part in detail["loc"]]
     message = detail["msg"]
     if detail["type"] == _OWN:
         context = detail.get("ctx", {})
-        keys += [str(context["key"])] if context.get("key") else []
+        keys += str(context["key"]).split(".") if context.get("key") else []
     elif detail["type"] == "missing":
         message = "is missing; add it"
     else:
@@ -116,7 +148,7 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | None = None) -> M:
+def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | None = None, keys: bool = False) -> M:
     """Check configuration data against a model.
 
     Parameters
@@ -128,6 +160,8 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
         The file, for messages.
     context : dict, optional
         What validators may know besides the data.
+    keys : bool
+        As for `explain`.
 
     Raises
     ------
@@ -137,7 +171,7 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
-        raise InputError(explain(error, where)) from None
+        raise InputError(explain(error, where, data, keys)) from None
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

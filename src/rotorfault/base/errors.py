@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
+
+# Share of letters that two names have in common, in their order, from which one may be meant for the other. Our
+# choice: one letter exchanged in a name of three is as much, names that merely share letters have less.
+ALIKE = 0.66
+SHORTENED = 3  # letters from which the beginning of a name may be meant for it
 
 
 class InputError(ValueError):
@@ -29,10 +35,20 @@ def unknown(sort: str, name: object, allowed: list[str]) -> str:
     allowed : list of str
         The names that exist.
     """
-    return f"unknown {sort} '{name}'{nearest(name, allowed)} (allowed: {', '.join(allowed)})"
+    return f"unknown {sort} '{name}'{nearest(name, allowed)} ({choices(allowed)})"
 
 
-def nearest(name: object, allowed: list[str]) -> str:
-    """The nearest of some names as a question for a message; empty where none is near."""
-    close = difflib.get_close_matches(str(name), allowed, n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else ""
+def choices(allowed: Iterable[str]) -> str:
+    """The names that exist, for a message that says which are allowed; also where there is none."""
+    return f"allowed: {', '.join(allowed) or 'none'}"
+
+
+def nearest(name: object, allowed: Iterable[str]) -> str:
+    """The nearest of some names as a question for a message; empty where none is near.
+
+    A name is near if it differs by a slip of the keys or two, by capitals, or by what is missing at its end.
+    """
+    given, names = str(name).lower(), {one.lower(): one for one in allowed}
+    close = difflib.get_close_matches(given, names, n=1, cutoff=ALIKE)
+    close = close or [one for one in names if len(given) >= SHORTENED and one.startswith(given)]
+    return f"; did you mean '{names[close[0]]}'?" if close else ""

@@ -79,6 +79,10 @@ class Registry(Generic[B]):
         """All names with their parts, in order of registration."""
         return [(name, self[name]) for name in self]
 
+    def present(self) -> list[tuple[str, Kind[B]]]:
+        """Names with their parts, without those of other packages that nobody has asked for yet."""
+        return list(self._members.items())
+
     def summary(self, name: str) -> str:
         """First line of the docstring of a part."""
         return (self[name].__doc__ or "").strip().partition("\n")[0]

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.progress import Say
 
 SCRIPTS: Final = Path(__file__).parent / "peer_scripts"
@@ -159,9 +159,9 @@ def measure(
     InputError
         If a name is not known.
     """
-    unknown = [name for name in names if name not in PEERS]
-    if unknown:
-        raise InputError(f"there is no peer {unknown[0]!r}; there are {', '.join(PEERS)}")
+    missing = [name for name in names if name not in PEERS]
+    if missing:
+        raise InputError(unknown("peer", missing[0], list(PEERS)))
     everything = cores or len(_allowed())
     results = {}
     for peer in (PEERS[name] for name in names):

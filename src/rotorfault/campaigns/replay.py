@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.block import METRICS
 from rotorfault.campaigns.flight_set import FlightSet, flight_of, seeds, values_of
@@ -79,7 +79,7 @@ def identifier_of(study: Study, label: str, cell: int, number: int) -> int:
     """
     labels = [variant.label for variant in study.variant]
     if label not in labels:
-        raise InputError(f"there is no variant '{label}' in {study.name}; allowed: {', '.join(labels)}")
+        raise InputError(f"{study.name}: {unknown('variant', label, labels)}")
     if not 0 <= cell < study.cells:
         raise InputError(f"there is no cell {cell} in {study.name}; allowed: 0 to {study.cells - 1}")
     if not 0 <= number < study.refine.most:

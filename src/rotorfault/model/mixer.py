@@ -1,9 +1,11 @@
 """The effectiveness matrix of a quadrotor with two opposite pairs of rotors, and its inverse in closed form.
 
-Rotors 1 and 2 are opposite each other about the centre of mass (r2 = -r1), so are rotors 3 and 4 (r4 = -r3); both
-rotors of a pair push the same way in yaw (sign s for the first pair, -s for the second). This covers "+", "X" and
-stretched X. With the sums S12 = F1 + F2, S34 = F3 + F4 and the differences D12 = F1 - F2, D34 = F3 - F4, the
-effectiveness matrix of `rotorfault.model.vehicle.wrench_of`, equation (4) of the paper, falls apart:
+Each rotor has one opposite it about the centre of mass, its partner; both rotors of a pair push the same way in yaw
+(sign s for the pair of rotor 1, -s for the other). This covers "+", "X" and stretched X. A vehicle's rotors come in
+any order. Here, and wherever pairs matter, they are put in the *order of pairs* (`in_pairs`): 1 is rotor 1, 2 its
+partner, 3 and 4 are the others, the lower number first. So r2 = -r1 and r4 = -r3. With the sums S12 = F1 + F2,
+S34 = F3 + F4 and the differences D12 = F1 - F2, D34 = F3 - F4, the effectiveness matrix of
+`rotorfault.model.vehicle.wrench_of`, equation (4) of the paper, falls apart:
 
     thrust    = S12 + S34                 tau_roll  =  y1 D12 + y3 D34
     tau_yaw   = s kappa (S12 - S34)       tau_pitch = -x1 D12 - x3 D34
@@ -18,18 +20,67 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.scalar import Scalar, either, less, select
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Vehicle
 
 
 class PairDemand(NamedTuple):
-    """A wrench in terms of the rotor pairs: it fixes all four rotor thrusts, and splits tilt from thrust and yaw."""
+    """A wrench in terms of the rotor pairs: it fixes all four rotor thrusts, and splits tilt from thrust and yaw.
+
+    Numbers count in the order of pairs.
+    """
 
     S12: Scalar  # N, F1 + F2
     S34: Scalar  # N, F3 + F4
     D12: Scalar  # N, F1 - F2
     D34: Scalar  # N, F3 - F4
+
+
+def _partner_of_first(vehicle: Vehicle) -> tuple[Scalar, Scalar]:
+    """1 or 0: whether the partner of rotor 1 is rotor 2, and whether it is rotor 3; else it is rotor 4."""
+    s = vehicle.rotor_yaw_sign
+    return less(0.0, s.r1 * s.r2), less(0.0, s.r1 * s.r3)
+
+
+def in_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
+    """Values of the rotors in the order of pairs.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Two opposite pairs of rotors in any order.
+    values : PerRotor
+        In the order of the vehicle.
+    """
+    second, third = _partner_of_first(vehicle)
+    r1, r2, r3, r4 = values
+    return PerRotor(
+        r1,
+        select(second, r2, select(third, r3, r4)),
+        select(second, r3, r2),
+        select(either(second, third), r4, r3),
+    )
+
+
+def from_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
+    """Values of the rotors in the order of the vehicle, from those in the order of pairs: undoes `in_pairs`.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Two opposite pairs of rotors in any order.
+    values : PerRotor
+        In the order of pairs.
+    """
+    second, third = _partner_of_first(vehicle)
+    r1, r2, r3, r4 = values
+    return PerRotor(
+        r1,
+        select(second, r2, r3),
+        select(second, r3, select(third, r2, r4)),
+        select(either(second, third), r4, r2),
+    )
 
 
 def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
@@ -47,8 +98,8 @@ def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
     PairDemand
         In N.
     """
-    x1, x3 = vehicle.rotor_x.r1, vehicle.rotor_x.r3
-    y1, y3 = vehicle.rotor_y.r1, vehicle.rotor_y.r3
+    x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)
+    y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
     tau = wrench.torque_B
     det = x1 * y3 - x3 * y1
     yaw = tau.z / (vehicle.rotor_yaw_sign.r1 * vehicle.torque_ratio)
@@ -61,11 +112,11 @@ def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
 
 
 def rotor_thrusts(pairs: PairDemand) -> PerRotor:
-    """Thrust of each rotor in N from the sums and differences of its pair."""
+    """Thrust of each rotor in N, in the order of pairs, from the sums and differences of its pair."""
     S12, S34, D12, D34 = pairs
     return PerRotor(S12 + D12, S12 - D12, S34 + D34, S34 - D34) * 0.5
 
 
 def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
     """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected."""
-    return rotor_thrusts(pair_demand(vehicle, wrench))
+    return from_pairs(vehicle, rotor_thrusts(pair_demand(vehicle, wrench)))

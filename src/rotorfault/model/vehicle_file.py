@@ -4,7 +4,7 @@
     description = "one line"
     mass = { value = 1.77, unit = "kg", source = "paper, section 5" }
     ...
-    [[rotor]]                    # four of them; 1 and 2 are opposite, and so are 3 and 4
+    [[rotor]]                    # four of them in any order: two pairs, opposite each other
     name = "front"               # optional: the vendor's name
     x = { value = 0.42, unit = "m", source = "paper, (3)" }    # forward of the centre of mass
     y = { value = 0.0, unit = "m", source = "..." }            # left of it
@@ -30,6 +30,8 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle
 
+Pairs = tuple[tuple[int, int], tuple[int, int]]
+_PAIRINGS: tuple[Pairs, ...] = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 BALANCE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
 
 
@@ -96,7 +98,7 @@ class VehicleFile(Strict):
     rotor_gain: Annotated[Quantity, _positive("1")] = Field(description="thrust per commanded thrust (k)")
     linear_drag: Annotated[Quantity, _not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
     gravity: Annotated[Quantity, _positive("m/s^2")] = Field(description="m/s^2")
-    rotor: tuple[Rotor, ...] = Field(description="four rotors; 1 and 2 opposite, 3 and 4 opposite")
+    rotor: tuple[Rotor, ...] = Field(description="four rotors in any order: two pairs, opposite each other")
 
     @model_validator(mode="after")
     def _consistent(self) -> VehicleFile:
@@ -135,19 +137,40 @@ class VehicleFile(Strict):
     def _check_pairs(self) -> PydanticCustomError | None:
         if len(self.rotor) != 4:
             return refusal("rotor", f"got {len(self.rotor)} tables; allowed: four [[rotor]] tables")
-        for first, second in ((0, 1), (2, 3)):
+        pairs = self.pairs
+        for first, second in pairs:
             a, b = self.rotor[first], self.rotor[second]
+            both = f"{self.rotor_label(first)} and {self.rotor_label(second)}"
             for axis, off in (("x", a.x.value + b.x.value), ("y", a.y.value + b.y.value)):
                 if not abs(off) <= BALANCE_TOLERANCE:
-                    message = f"rotors {first + 1} and {second + 1} must be opposite about the centre of mass: their"
-                    return refusal(f"rotor.{second}.{axis}", f"{message} {axis} sum to {off:.6g} m; allowed: 0")
+                    message = f"{both} must be opposite about the centre of mass: their {axis} sum to {off:.6g} m;"
+                    return refusal(f"rotor.{second}.{axis}", f"{message} allowed: 0")
             if a.yaw != b.yaw:
-                message = f"got '{b.yaw}'; allowed: '{a.yaw}', as rotors {first + 1} and {second + 1} are a pair"
+                message = f"got '{b.yaw}'; allowed: '{a.yaw}', as {both} are opposite and turn the same way"
                 return refusal(f"rotor.{second}.yaw", message)
-        if self.rotor[0].yaw == self.rotor[2].yaw:
-            message = f"got '{self.rotor[2].yaw}' for both pairs; allowed: one for rotors 1, 2, the other for 3, 4"
-            return refusal("rotor.2.yaw", message)
+        if self.rotor[0].yaw == self.rotor[pairs[1][0]].yaw:
+            one, other = (" and ".join(self.rotor_label(k) for k in pair) for pair in pairs)
+            message = f"got '{self.rotor[0].yaw}' for all rotors; allowed: one sign for {one}, the other for {other}"
+            return refusal(f"rotor.{pairs[1][0]}.yaw", message)
         return None
+
+    def _unlike_pairs(self, pairs: Pairs) -> tuple[float, int]:
+        """How far rotors are from opposite, and how many pairs push different ways in yaw."""
+        rotors = [(self.rotor[a], self.rotor[b]) for a, b in pairs]
+        off = [math.hypot(a.x.value + b.x.value, a.y.value + b.y.value) for a, b in rotors]
+        # Below the tolerance no distance counts, so that the sense of rotation decides.
+        far = math.fsum(x for x in off if not x <= BALANCE_TOLERANCE)
+        return far, sum(a.yaw != b.yaw for a, b in rotors)
+
+    def rotor_label(self, index: int) -> str:
+        """A rotor in a message, by its number from 1 and its name if it has one; `index` counts from 0."""
+        name = self.rotor[index].name
+        return f"rotor {index + 1}" + (f" ('{name}')" if name else "")
+
+    @property
+    def pairs(self) -> Pairs:
+        """Indices from 0 of the rotors that are opposite each other, or nearest to it; first the pair of rotor 1."""
+        return min(_PAIRINGS, key=self._unlike_pairs)
 
     def _check_rank(self) -> PydanticCustomError | None:
         # The yaw row is scaled by any length; only the rank counts.

@@ -38,14 +38,14 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
     largest = float(arms.max())
     apart = min(math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :])
     radius = DISC * apart
-    for first, second in ((0, 1), (2, 3)):
+    for first, second in vehicle.pairs:
         axes.plot(*places[[first, second], ::-1].T, color="0.8", linewidth=5.0, solid_capstyle="round", zorder=1)
     for number, (rotor, place) in enumerate(zip(vehicle.rotor, places, strict=True), start=1):
         _draw_rotor(axes, number, rotor.yaw, place, radius)
     _draw_axes(axes, largest, radius)
-    # Rotors 2 and 3 lie where the body axes are not.
-    pairs = (1,) if abs(arms[1] - arms[2]) <= SAME * largest else (1, 2)
-    for k in pairs:
+    # Of each pair the rotor that lies where the body axes are not: behind, or to the right.
+    one, other = (max(reversed(pair), key=lambda k: -places[k].sum()) for pair in vehicle.pairs)
+    for k in (one,) if abs(arms[one] - arms[other]) <= SAME * largest else (one, other):
         _draw_length(axes, places[k], OFF * radius)
     reach = np.abs(places).max(axis=0) + 1.45 * radius
     axes.set(xlim=(reach[1] * 1.15, -reach[1] * 1.15), ylim=(-reach[0], reach[0]), aspect="equal")

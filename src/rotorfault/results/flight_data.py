@@ -116,7 +116,7 @@ def _coordinates(times: Array) -> dict[str, Variable]:
         "angle_2": Variable(("angle_2",), np.array(ANGLES), {}),
         "component": Variable(("component",), np.array(COMPONENTS), {"long_name": "of a quaternion, scalar first"}),
         "rotor": Variable(
-            ("rotor",), np.arange(1, 5), {"long_name": "1 front, 2 rear, 3 right, 4 left on a plus vehicle"}
+            ("rotor",), np.arange(1, 5), {"long_name": "number of the rotor, in the order of the vehicle file"}
         ),
     }
 

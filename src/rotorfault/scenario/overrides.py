@@ -73,7 +73,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
 def _index(items: list[Any], part: str, key: str) -> int:
     if not part.isdigit() or int(part) >= len(items):
-        raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: 0 to {len(items) - 1}")
+        allowed = f"0 to {len(items) - 1} (0 is the first)" if items else "none, for the list is empty"
+        raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: {allowed}")
     return int(part)
 
 

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, PlainSerializer, ValidationError, V
 from pydantic_core import PydanticCustomError
 
 from rotorfault.base import foreign
-from rotorfault.base.config import Strict, passed_on, refusal
-from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.config import Strict, in_words, passed_on, refusal
+from rotorfault.base.errors import InputError, choices, unknown
 from rotorfault.base.registry import Kind
 from rotorfault.model.slot import Slot
 
@@ -125,6 +125,8 @@ def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Pa
         made: Kind[B] = slot.registry[kind] if factory is None else factory
         preset = settings.pop("preset", None) if slot.presets is not None else None
         preset, settings = _with_preset(slot, kind, preset, settings, made)
+        for key in settings:
+            _refuse_of_another_kind(slot, kind, key, made)
         checked = made.Settings.model_validate(settings)
         for place in checked.code():
             foreign.require_allowed(place, allow, f"{slot.registry.sort} {kind}")
@@ -194,8 +196,9 @@ def part_from(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) 
     try:
         return read(slot, value, allow)
     except PydanticCustomError as error:
-        key = (error.context or {}).get("key", "")
-        raise InputError(": ".join(word for word in (slot.name, key, error.message()) if word)) from None
+        key = str((error.context or {}).get("key", ""))
+        words = (slot.name, in_words(key.split("."), value) if key else "", error.message())
+        raise InputError(": ".join(word for word in words if word)) from None
 
 
 def _foreign(slot: Slot[B], place: str, allow: bool | Collection[str]) -> Kind[B]:
@@ -220,6 +223,16 @@ def _with_preset(
     if preset not in ("", NO_PRESET) and not complete:
         raise refusal("preset", unknown("preset", preset, [*known, NO_PRESET]))
     return preset, settings
+
+
+def _refuse_of_another_kind(slot: Slot[Any], kind: str, key: str, made: Kind[Any]) -> None:
+    """Say of an unknown key which kinds of part it is a setting of, if it is of any."""
+    known = list(made.Settings.model_fields)
+    others = [name for name, other in slot.registry.present() if key in other.Settings.model_fields]
+    if key not in known and others:
+        where = " or ".join(f"'{name}'" for name in others)
+        message = f"unknown key ({choices(known)}), as this is kind '{kind}'; it is a setting of kind {where}"
+        raise refusal(key, message)
 
 
 def _merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

@@ -209,7 +209,7 @@ def scenario_from(tables: Mapping[str, Any], where: str, allow_code: bool | Coll
     InputError
         If anything is not right.
     """
-    return validate(_model(SLOTS.version), tables, where, {"allow_code": allow_code})
+    return validate(_model(SLOTS.version), tables, where, {"allow_code": allow_code}, keys=True)
 
 
 @lru_cache(maxsize=4)

@@ -1,6 +1,7 @@
 """How much thrust the believed rotors can give while the body stays balanced.
 
-With what rotor i can give at most, H_i = (1 - loss_i) k c_max, opposite rotors balanced in tilt give at most
+With what rotor i can give at most, H_i = (1 - loss_i) k c_max, opposite rotors balanced in tilt give at most (in the
+order of pairs, see `mixer`)
 
     S12 = 2 min(H1, H2),   S34 = 2 min(H3, H4)
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.model.mixer import in_pairs
 from rotorfault.model.motion import effect_of
 from rotorfault.model.vehicle import Vehicle
 
@@ -35,7 +37,7 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
         In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
         this as there is with yaw given up.
     """
-    most = effect_of(vehicle, loss) * vehicle.thrust_max
+    most = in_pairs(vehicle, effect_of(vehicle, loss) * vehicle.thrust_max)
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
     with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
     return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

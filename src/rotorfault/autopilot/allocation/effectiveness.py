@@ -1,7 +1,7 @@
 """Allocation with the believed effectiveness and the rotor limits, in strict order: tilt, then thrust, then yaw.
 
 Rotor i can give any thrust in [lo_i, hi_i] = (1 - loss_i) k [c_min, c_max]. In the sums and differences of the two
-rotor pairs (see `mixer`) the lexicographic optimum
+rotor pairs, numbered in their order (see `mixer`), the lexicographic optimum
 
     1. least |D12 - D12_demand| and least |D34 - D34_demand|           (roll and pitch torque, in arm axes)
     2. among those, least |thrust - thrust_demand|
@@ -39,7 +39,7 @@ from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, clip, less, maximum, minimum, select
 from rotorfault.model.block import Context, Nothing, Record
-from rotorfault.model.mixer import PairDemand, pair_demand, rotor_thrusts
+from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, pair_demand, rotor_thrusts
 from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import register
@@ -96,7 +96,8 @@ def allocated(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiven
     low = effect * least
     high = dead.map(select, low, effect * vehicle.thrust_max)
 
-    thrust = rotor_thrusts(attainable_nearest(pair_demand(vehicle, wrench), low, high)).map(clip, low, high)
+    pairs = attainable_nearest(pair_demand(vehicle, wrench), in_pairs(vehicle, low), in_pairs(vehicle, high))
+    thrust = from_pairs(vehicle, rotor_thrusts(pairs)).map(clip, low, high)
 
     # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
     divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
@@ -112,7 +113,7 @@ def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor) -> Pai
     demand : PairDemand
         In N.
     low, high : PerRotor
-        Least and largest thrust of each rotor in N.
+        Least and largest thrust of each rotor in N, in the order of pairs.
 
     Returns
     -------

@@ -5,7 +5,8 @@ As printed, with u1, u2 the roll and pitch torque over the arm and u4 the thrust
     F1 = u4/4,   F2 = u2 + u4/4,   F3 = -u1/2 + u4/4,   F4 = u1/2 + u4/4
 
 The faulty rotor keeps a quarter of the thrust, its partner carries the whole moment of the pair, yaw is given up.
-In pair differences (see `mixer`; u2 = -D12, u1 = -D34 on the paper's vehicle), for all four at once:
+In pair differences (see `mixer`; u2 = -D12, u1 = -D34 on the paper's vehicle), for all four at once, in the order of
+pairs:
 
     F1 = T/4                 where rotor 1 is flagged           (41)
          T/4 + D12           where rotor 2 is flagged           (42), whose printed u1 must be u2
@@ -34,9 +35,9 @@ from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, both, clip, either, select
 from rotorfault.model.block import Context, Nothing, Record
-from rotorfault.model.mixer import PairDemand, pair_demand
+from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, pair_demand
 from rotorfault.model.motion import limited
-from rotorfault.model.signals import Allocation, Diagnosis
+from rotorfault.model.signals import Allocation
 from rotorfault.model.slot import register
 
 
@@ -68,19 +69,25 @@ class PaperRule(Allocator[Nothing, PaperRuleParameters]):
     ) -> tuple[Nothing, Allocation, Record]:
         """Commands for a demanded wrench."""
         wrench, diagnosis, vehicle, _ = inputs
-        thrust = rule_thrusts(pair_demand(vehicle, wrench), diagnosis.flagged)
+        flagged = in_pairs(vehicle, diagnosis.flagged)
+        thrust = from_pairs(vehicle, rule_thrusts(pair_demand(vehicle, wrench), flagged))
         command = limited(vehicle, thrust / vehicle.rotor_gain)
         allocation = select_record(
-            falls_back(diagnosis),
+            falls_back(flagged),
             allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min),
             account(vehicle, wrench, diagnosis, command),
         )
         return memory, allocation, Nothing()
 
 
-def falls_back(diagnosis: Diagnosis) -> Scalar:
-    """1 where two rotors of one axis are flagged, so that the rule does not apply and the fallback takes over."""
-    flagged = diagnosis.flagged
+def falls_back(flagged: PerRotor) -> Scalar:
+    """1 where two rotors of one axis are flagged, so that the rule does not apply and the fallback takes over.
+
+    Parameters
+    ----------
+    flagged : PerRotor
+        1 where a fault is declared, in the order of pairs.
+    """
     return either(both(flagged.r1, flagged.r2), both(flagged.r3, flagged.r4))
 
 
@@ -93,11 +100,12 @@ def rule_thrusts(demand: PairDemand, flagged: PerRotor) -> PerRotor:
         In N.
     flagged : PerRotor
         1 where a fault is declared, at most one of rotors 1, 2 and one of 3, 4; all 0 gives the exact inverse (36).
+        In the order of pairs.
 
     Returns
     -------
     PerRotor
-        In N.
+        In N, in the order of pairs.
     """
     quarter = (demand.S12 + demand.S34) * 0.25
     yaw = (demand.S12 - demand.S34) * 0.25

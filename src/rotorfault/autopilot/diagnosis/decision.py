@@ -55,6 +55,7 @@ from rotorfault.maths.scalar import (
     select,
     sqrt,
 )
+from rotorfault.model.mixer import from_pairs, in_pairs
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.vehicle import Vehicle, hover_thrust
 
@@ -257,8 +258,8 @@ def decide(
         return threshold, test, since, below, flagged, smoothed, tested
 
     before = (DecisionMemory(*values) for values in zip(*memory, strict=True))
-    r1, r2, r3, r4 = evidence.residual
-    partners = PerRotor(r2, r1, r4, r3)
+    r1, r2, r3, r4 = in_pairs(vehicle, evidence.residual)
+    partners = from_pairs(vehicle, PerRotor(r2, r1, r4, r3))
     known = (evidence.residual, partners, evidence.thrust, *evidence.model_error)
     rows = zip(losses, *known, before, strict=True)
     threshold, test, *after = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))

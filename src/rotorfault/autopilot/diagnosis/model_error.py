@@ -32,7 +32,7 @@ from typing import NamedTuple
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, absolute, maximum, minimum, sqrt
-from rotorfault.model.mixer import PairDemand, pair_demand
+from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
 from rotorfault.model.motion import limited
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Vehicle
@@ -186,7 +186,8 @@ def misstated(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Mis
 
     lagged = memory.lagging.map(square)
     first, second = arm_12 * arm_12, arm_34 * arm_34
-    return Misstated(lagged + turned * turned, lagged + PerRotor(first, first, second, second))
+    beside = from_pairs(vehicle, PerRotor(first, first, second, second))
+    return Misstated(lagged + turned * turned, lagged + beside)
 
 
 def noise_of(memory: ModelErrorMemory, vehicle: Vehicle, dynamics: Dynamics) -> Scalar:
