@@ -51,7 +51,7 @@ def test_things_in_lists_are_called_by_number_and_name(path: str, words: str) ->
         ({"leg": [{"length": 1.0}, {"name": "a", "length": -1.0}]}, True,
          "file: leg 2 ('a'): length: must be greater than 0; got -1.0 (key leg.1.length)"),
         ({"leg": [], "size": [1.0, "x"]}, True,
-         "file: size, entry 2: must be a valid number, unable to parse string as a number; got 'x' (key size.1)"),
+         "file: size, entry 2: got the text 'x'; allowed: a number (key size.1)"),
         ({"leg": [], "sise": 1}, True, "file: sise: unknown key; did you mean 'size'? (allowed: leg, size)"),
     ],
 )  # fmt: skip

@@ -171,7 +171,20 @@ def test_results_as_a_dataset() -> None:
         ({"nothing.such": [0.1]}, "unknown key"),
         ({"fault.3.loss": [0.1]}, "no index into a list of 1"),
         ({"mismatch.mass": [1.0, float("nan")]}, "flight 1"),
+        ({"mismatch.mass": ["1.0"]}, "flight 0: mismatch.mass: got the text '1.0'; allowed: a number"),
+        ({"mismatch.mass": [True, True]}, "flight 0: mismatch.mass: got true; allowed: a number"),
+        ({"vehicle.mass.value": np.array([True])}, "flight 0: vehicle.mass.value: got true; allowed: a number"),
+        ({"fault.0.rotor": [1.5]}, "flight 0: .*rotor: .*got 1.5"),
+        ({"fault.0.loss": [True, 0.5]}, "numbers and truth values together"),
+        ({"fault.0.loss": [0.5, "0.2"]}, "numbers and texts together"),
+        ({"fault.0.loss": np.array([0.5, "0.2"], dtype=object)}, "one value per flight"),
+        ({"fault.0.loss": "01"}, "a list with one value per flight"),
+        ({"fault.0.loss": {0.1, 0.2}}, "a list with one value per flight"),
+        ({"fault.0.loss": np.ma.array([0.1, 0.2], mask=[False, True])}, "a list with one value per flight"),
+        ({"fault.0.loss": [10**400, 1]}, "a list with one value per flight"),
         ({"seed": [0.5]}, "seed: got"),
+        ({"seed": [True]}, "seed: got"),
+        ({"seed": ["1"]}, "seed: got"),
         ({"seed": [-1]}, "allowed: whole numbers from 0"),
         ({"controller.kind": ["smc", "scm"]}, "unknown controller 'scm'"),
         ({3: [1.0]}, "allowed: dotted keys"),
@@ -186,6 +199,14 @@ def test_bad_columns_are_refused_before_anything_flies(
     monkeypatch.setattr(many, "load_engine", never)
     with pytest.raises(InputError, match=message):
         rf.fly_many(base(), vary)
+
+
+def test_columns_may_come_in_any_form_of_numbers() -> None:
+    losses = [0.25, 0.5]
+    forms = (losses, np.array(losses, dtype=object), np.float32(losses), (loss for loss in losses), tuple(losses))
+    flown = [rf.fly_many(base(), {"fault.0.loss": form}).table.columns["lowest"].tolist() for form in forms]
+    assert flown == [flown[0]] * len(forms)
+    assert rf.fly_many(base(), {"seed": [1.0, 2.0], "fault.0.rotor": [1.0, 2.0]}).varied["seed"].tolist() == [1, 2]
 
 
 def test_a_bad_value_far_behind_is_refused_before_anything_flies(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -116,7 +116,8 @@ def test_ground_none_is_no_ground() -> None:
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        (True, "ground: got True; allowed: a table with 'kind', or a name: level"),
+        (True, "ground.height: got true; allowed: a number"),
+        ("0.5", "ground.height: got the text '0.5'; allowed: a number, without quotation marks"),
         ("lvel", "ground.kind: unknown ground 'lvel'; did you mean 'level'"),
         (math.inf, "ground.height: must be a finite number; got inf"),
         ({"heigth": 1.0}, "ground.heigth: unknown key; did you mean 'height'"),

@@ -12,28 +12,35 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
 from rotorfault.base.errors import InputError, choices, nearest
+from rotorfault.base.number_rule import OWN, short, strict
+from rotorfault.base.number_rule import refusal as refusal
 
 M = TypeVar("M", bound=BaseModel)
 
 Three = tuple[float, float, float]
 """Three numbers, one per axis."""
 
-# Marks the errors that say what came by themselves, so that `explain` does not say it twice.
-_OWN = "rotorfault"
-
 
 class Strict(BaseModel):
-    """A configuration that refuses unknown keys, NaN and infinity, and cannot be changed once checked."""
+    """A configuration that refuses unknown keys, NaN and infinity, and what is no number where one belongs.
+
+    It cannot be changed once checked.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def code(self) -> tuple[str, ...]:
         """Places of code from outside the package that these settings would run."""
         return ()
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler, /) -> CoreSchema:
+        # Here, for all fields of all configurations at once, those of users' own parts included.
+        return strict(handler(source))
 
     @model_validator(mode="before")
     @classmethod
@@ -42,26 +49,10 @@ class Strict(BaseModel):
         # about the key that was meant.
         if isinstance(data, dict):
             allowed = [name if field.alias is None else field.alias for name, field in cls.model_fields.items()]
-            for key, value in data.items():
+            for key in data:
                 if key not in allowed and key not in cls.model_fields:
                     raise refusal(str(key), f"unknown key{nearest(key, allowed)} ({choices(allowed)})")
-                # pydantic would take true for 1.
-                if isinstance(value, bool) and cls.model_fields[key].annotation in (float, int, float | None):
-                    raise refusal(str(key), f"got {str(value).lower()}; allowed: a number")
         return data
-
-
-def refusal(key: str, message: str) -> PydanticCustomError:
-    """The error to raise in a validator when `message` says all: what came, what is allowed, how to mend it.
-
-    Parameters
-    ----------
-    key : str
-        The key below the validated object that is at fault; empty for the object itself.
-    message : str
-        One line.
-    """
-    return PydanticCustomError(_OWN, "{message}", {"message": message, "key": key})
 
 
 def explain(error: ValidationError, where: str, data: Any = None, keys: bool = False) -> str:
@@ -131,7 +122,7 @@ def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
     """Path of the key that is wrong, and what is wrong with it."""
     keys = [str(part) for part in detail["loc"]]
     message = detail["msg"]
-    if detail["type"] == _OWN:
+    if detail["type"] == OWN:
         context = detail.get("ctx", {})
         keys += str(context["key"]).split(".") if context.get("key") else []
     elif detail["type"] == "missing":
@@ -139,13 +130,8 @@ def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
     else:
         message = re.sub(r"^(Input|String|Tuple|List) should", "must", message).replace("Value error, ", "")
         message = re.sub(r"a valid dictionary or instance of \w+", "a table", message)
-        message += f"; got {_short(detail['input'])}"
+        message += f"; got {short(detail['input'])}"
     return keys, " ".join(message.split())
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | None = None, keys: bool = False) -> M:

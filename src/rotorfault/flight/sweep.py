@@ -10,6 +10,7 @@ Each part is made and checked once for each different set of its own numbers, no
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_own
+from rotorfault.base.number_rule import short
 from rotorfault.engine.program import same_code
 from rotorfault.flight.assembly import Group, assemble, overridden
 from rotorfault.flight.beginning import begins_alike
@@ -40,7 +42,7 @@ def checked_columns(scenario: Scenario, vary: Mapping[str, Any]) -> dict[str, ND
         If a key is no key of the scenario, a column is empty or no list, or lengths differ.
     """
     if not isinstance(vary, Mapping):
-        raise InputError(f"vary: got {_told(vary)}; allowed: dotted keys, each with one value per flight")
+        raise InputError(f"vary: got {short(vary)}; allowed: dotted keys, each with one value per flight")
     if not vary:
         raise InputError("nothing varies; give at least one key with one value per flight, such as seed=range(100)")
     found: dict[str, NDArray[Any]] = {}
@@ -48,14 +50,7 @@ def checked_columns(scenario: Scenario, vary: Mapping[str, Any]) -> dict[str, ND
     for key, values in vary.items():
         if not isinstance(key, str):
             raise InputError(f"vary: got the key {key!r}; allowed: dotted keys, such as 'fault.0.loss'")
-        try:
-            column = np.asarray(list(values) if isinstance(values, range) else values)
-        except ValueError:
-            column = np.zeros((0, 0))  # rows of unlike lengths
-        if column.ndim != 1 or not len(column) or column.dtype.kind not in "biufU":
-            raise InputError(
-                f"vary: {key}: got {_told(values)}; allowed: a list with one value per flight: numbers, or texts"
-            )
+        column = _column(key, values)
         override(tables, key, column[0].item())  # tells whether there is such a key
         found[key] = column
     lengths = {key: len(column) for key, column in found.items()}
@@ -63,6 +58,46 @@ def checked_columns(scenario: Scenario, vary: Mapping[str, Any]) -> dict[str, ND
         told = ", ".join(f"{key} {length}" for key, length in lengths.items())
         raise InputError(f"vary: columns differ in length ({told}); give one value per flight in each")
     return found
+
+
+def _column(key: str, values: Any) -> NDArray[Any]:
+    """One column as an array: whole numbers, numbers, truth values or texts."""
+    allowed = "allowed: a list with one value per flight: numbers, or texts"
+    if isinstance(values, (str, bytes, Mapping, set, frozenset)) or np.ma.is_masked(values):
+        raise InputError(f"vary: {key}: got {short(values)}; {allowed}")
+    # Before NumPy makes texts of the numbers beside a text, and numbers of truth values.
+    listed = values if isinstance(values, (range, np.ndarray)) else _listed(values)
+    if isinstance(listed, list) and len(sorts := {_sort(value) for value in listed}) > 1:
+        raise InputError(f"vary: {key}: got {short(values)}, {' and '.join(sorted(sorts))} together; {allowed}")
+    try:
+        column = np.asarray(list(listed) if isinstance(listed, range) else listed)
+    except ValueError:
+        column = np.zeros((0, 0))  # rows of unlike lengths
+    if column.ndim == 1 and column.dtype == object:
+        column = _of_objects(column)
+    if column.ndim != 1 or not len(column) or column.dtype.kind not in "biufU":
+        raise InputError(f"vary: {key}: got {short(values)}; {allowed}")
+    return column
+
+
+def _listed(values: Any) -> Any:
+    """Values one by one, where there are any."""
+    try:
+        return list(values)
+    except TypeError:
+        return values
+
+
+def _sort(value: Any) -> str:
+    if isinstance(value, (bool, np.bool_)):
+        return "truth values"
+    return "texts" if isinstance(value, str) else "numbers" if isinstance(value, Real) else f"{type(value).__name__}s"
+
+
+def _of_objects(column: NDArray[Any]) -> NDArray[Any]:
+    """An array of objects as one of numbers, texts or truth values, if all are of one sort."""
+    sorts = {_sort(value) for value in column}
+    return np.array(column.tolist()) if len(sorts) == 1 and sorts <= {"numbers", "texts", "truth values"} else column
 
 
 def groups_of(scenario: Scenario, columns: Columns) -> list[Group]:
@@ -98,8 +133,10 @@ def _seeds(scenario: Scenario, columns: Columns, count: int) -> NDArray[np.int64
     if "seed" not in columns:
         return np.full(count, scenario.seed, dtype=np.int64)
     column = columns["seed"]
-    if not np.issubdtype(column.dtype, np.integer) or column.min() < 0 or column.max() > MOST_SEED:
-        raise InputError(f"vary: seed: got {_told(column)}; allowed: whole numbers from 0 to {MOST_SEED:.0e}")
+    # As a scenario file, it takes 7.0 for 7.
+    whole = column.dtype.kind in "iuf" and bool(np.all(np.isfinite(column)) and np.all(column == np.floor(column)))
+    if not whole or column.min() < 0 or column.max() > MOST_SEED:
+        raise InputError(f"vary: seed: got {short(column)}; allowed: whole numbers from 0 to {MOST_SEED:.0e}")
     return column.astype(np.int64)
 
 
@@ -134,8 +171,3 @@ def _value_at(tables: dict[str, Any], key: str) -> Any:
     for part in key.split("."):
         here = here[int(part)] if isinstance(here, list) else here.get(part) if isinstance(here, dict) else None
     return here
-
-
-def _told(values: Any) -> str:
-    text = " ".join(repr(values).split())
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -38,7 +38,7 @@ BALANCE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
 class Quantity(Strict):
     """A number with its unit and where it comes from."""
 
-    value: Annotated[float, Field(strict=True, description="the number, in `unit`")]
+    value: float = Field(description="the number, in `unit`")
     unit: str = Field(description="SI unit")
     source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
 

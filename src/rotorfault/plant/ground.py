@@ -21,11 +21,13 @@ rho_z as lever of friction is a simplification with the same end. Rotor tips and
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.base.config import Strict
+from rotorfault.base.number_rule import plain_number
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar, maximum, sqrt
 from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT
@@ -67,10 +69,9 @@ class Ground(Block[State, Contact, MemoryT, ParametersT]):
 
 
 def _level(value: Any) -> Any:
-    """A bare number is the height of level ground."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return {"kind": "level", "height": value}
-    return value
+    """A bare number is the height of level ground; what only looks like one is refused as a height is."""
+    named = isinstance(value, str) and math.isnan(plain_number(value))
+    return value if value is None or named or isinstance(value, Mapping) else {"kind": "level", "height": value}
 
 
 GROUND = Slot(
