@@ -51,17 +51,6 @@ def test_configuration_and_versions_travel_with_the_flight(short: rf.Flight) -> 
     assert json.loads(short.data.attrs["versions"])["rotorfault"] == rf.__version__
 
 
-def test_csv_has_a_column_per_component(short: rf.Flight, tmp_path: Path) -> None:
-    path = short.to_csv(tmp_path / "flight.csv")
-    header = path.read_text().splitlines()[0].split(",")
-    table = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert table.shape == (500, len(header))
-    assert {"time", "position_x", "attitude_yaw", "thrust_4", "controller.gain_angle_roll_pitch"} <= set(header)
-    assert table[:, header.index("position_z")] == pytest.approx(
-        short.data["position"].sel(axis="z").values, rel=1e-8
-    )
-
-
 def climbing(time: float) -> tuple[float, float, float, float]:
     return 0.0, 0.0, 1.0 + 0.1 * time, 0.0
 

@@ -7,10 +7,10 @@ import sys
 import typer
 
 from rotorfault.base.errors import InputError
-from rotorfault.cli import campaign, fly, look, studies
+from rotorfault.cli import campaign, export, fly, look, studies
 from rotorfault.cli.app import app
 
-__all__ = ["app", "campaign", "fly", "look", "main", "studies"]
+__all__ = ["app", "campaign", "export", "fly", "look", "main", "studies"]
 
 
 def main() -> None:

@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-import numpy as np
-
-from rotorfault.base.files import in_folder, output_folder, write_atomically
+from rotorfault.base.files import output_folder, write_atomically
+from rotorfault.results.export import write_csv
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
@@ -94,35 +93,33 @@ class Flight:
 
         return figures.draw(self.data)
 
-    def to_csv(self, path: str | Path) -> Path:
+    def to_csv(self, path: str | Path, every: int = 1, units: bool = True) -> Path:
         """Write all signals as one table, a row per record and a column per component.
+
+        Floats look like floats in every file and keep all digits, so a column has one type in all flights.
+
+        Parameters
+        ----------
+        path : str or Path
+        every : int
+            Of so many records one is written, from the first on.
+        units : bool
+            Whether the names of columns end in the unit, as in ``velocity_x [m/s]``; pure numbers have ``[1]``.
 
         Raises
         ------
         InputError
-            If the folder does not exist.
+            If `every` is no whole number from 1 on, or the folder does not exist.
         """
-        path = in_folder(Path(path))
-        columns = {"time": self.data["time"].values}
-        for name, variable in self.data.data_vars.items():
-            flat = variable.values.reshape(len(columns["time"]), -1)
-            labels = [
-                "_".join(
-                    [
-                        str(name),
-                        *(str(self.data[dim].values[i]) for dim, i in zip(variable.dims[1:], at, strict=True)),
-                    ]
-                )
-                for at in np.ndindex(variable.shape[1:])
-            ]
-            columns.update(zip(labels, flat.T, strict=True))
-        table = np.column_stack(list(columns.values()))
-        header = ",".join(columns)
-        write_atomically(
-            path,
-            lambda temporary: np.savetxt(temporary, table, fmt="%.9g", delimiter=",", header=header, comments=""),
-        )
-        return path
+        return write_csv(self._arrays(), Path(path), every, units)
+
+    def _arrays(self) -> FlightData:
+        """The records as plain arrays, on the same memory."""
+        if isinstance(self._data, FlightData):
+            return self._data
+        from rotorfault.results.dataset import as_flight_data
+
+        return as_flight_data(self._data)
 
     def save(self, path: str | Path) -> Path:
         """Write the flight as NetCDF, with its whole configuration.
@@ -132,12 +129,8 @@ class Flight:
         InputError
             If the folder does not exist.
         """
-        path, data = Path(path), self._data
-        if not isinstance(data, FlightData):
-            from rotorfault.results.dataset import as_flight_data
-
-            data = as_flight_data(data)
-        write_netcdf(data, path)
+        path = Path(path)
+        write_netcdf(self._arrays(), path)
         return path
 
     def write(self, folder: str | Path, with_figures: bool = True) -> list[Path]:

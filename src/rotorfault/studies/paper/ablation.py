@@ -12,8 +12,6 @@ the wind (45)), case 3 at 40 s (six switches).
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -27,7 +25,7 @@ from rotorfault.autopilot.control.ismc import IsmcSettings
 from rotorfault.autopilot.control.riccati import position_gain
 from rotorfault.autopilot.control.roismc import RoismcSettings
 from rotorfault.autopilot.control.sdre import Weights, position_gains, sdre_parameters
-from rotorfault.base.files import write_atomically
+from rotorfault.base.csv_text import number, write_rows
 from rotorfault.maths.geometry import zeros
 from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES, run_of
@@ -149,31 +147,24 @@ def rows(results: Mapping[str, Result]) -> list[tuple[Variant, Result]]:
 
 def write_csv(results: Mapping[str, Result], path: Path) -> Path:
     """Write the table; numbers of a lost flight count up to its end, and it has no settling time."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(HEADER)
+    lines = []
     for variant, result in rows(results):
         s, surface = result.summary, variant.surface != "none"
         chattering = result.extra["chattering"]
-        table.writerow(
+        lines.append(
             [
                 variant.case, _onoff(variant.sdre), _onoff(surface), variant.surface if surface else "",
                 variant.diagnosis, s["controller"], s["outcome"], "yes" if s["survived"] else "no",
-                _number(s["end_time"]), _number(s["cost"]), _number(_mse(result)),
-                _number(s["settle_time"]["overall"]), _number(_longest_return(result)),
-                _number(chattering["steady_total_variation"]), _number(chattering["share_above_band"]),
+                number(s["end_time"]), number(s["cost"]), number(_mse(result)),
+                number(s["settle_time"]["overall"]), number(_longest_return(result)),
+                number(chattering["steady_total_variation"]), number(chattering["share_above_band"]),
             ]
         )  # fmt: skip
-    write_atomically(path, lambda temporary: temporary.write_text(text.getvalue(), encoding="utf-8"))
-    return path
+    return write_rows(path, HEADER, lines)
 
 
 def _onoff(choice: bool) -> str:
     return "on" if choice else "off"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.5g}"
 
 
 def _mse(result: Result) -> float | None:

@@ -92,7 +92,15 @@ def _flights(results: Mapping[str, Result]) -> list[dict[str, Any]]:
 
 def _rows(path: Path) -> list[list[str]]:
     with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.reader(file))
+        return [[_shown(text) for text in row] for row in csv.reader(file)]
+
+
+def _shown(text: str) -> str:
+    """What stands in a table, with as many digits as a reader looks at."""
+    try:
+        return f"{float(text):.5g}" if "." in text else text
+    except ValueError:
+        return text
 
 
 def _records() -> list[dict[str, Any]]:

@@ -8,8 +8,6 @@ cut at 20 s (the period of the wind (45)), case 3 at 40 s (six switches).
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorfault.base.files import write_atomically
+from rotorfault.base.csv_text import number, write_rows
 from rotorfault.studies.paper.cases import CASES
 from rotorfault.studies.paper.conclusion_figure import conclusion_figure
 from rotorfault.studies.paper.judges import detected
@@ -117,34 +115,27 @@ HEADER = (
 
 def write_csv(results: Mapping[str, Result], path: Path) -> Path:
     """Write the table; no ratio and no comparison where a flight was lost."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(HEADER)
+    lines = []
     for row in rows(results):
         values = [
             (value(row.ours), value(row.theirs))
             for value in (settling, lambda r, c=row.variation.cost: cost_of(r, c), error_of)
         ]
         (time, smc_time), (cost, smc_cost), (error, smc_error) = values
-        table.writerow(
+        lines.append(
             [
                 row.variation.id, row.variation.group, row.case, row.variation.law,
-                row.ours.summary["outcome"], row.theirs.summary["outcome"], _number(time), _number(smc_time),
-                _number(cost), _number(smc_cost), _ratio(row, cost, smc_cost),
-                _number(error), _number(smc_error), _ratio(row, error, smc_error),
+                row.ours.summary["outcome"], row.theirs.summary["outcome"], number(time), number(smc_time),
+                number(cost), number(smc_cost), _ratio(row, cost, smc_cost),
+                number(error), number(smc_error), _ratio(row, error, smc_error),
                 *(_word(row.holds[name]) for name in CONCLUSIONS), " ".join(row.moved),
             ]
         )  # fmt: skip
-    write_atomically(path, lambda temporary: temporary.write_text(text.getvalue(), encoding="utf-8"))
-    return path
+    return write_rows(path, HEADER, lines)
 
 
-def _number(value: float) -> str:
-    return f"{value:.5g}" if math.isfinite(value) else ""
-
-
-def _ratio(row: Row, a: float, b: float) -> str:
-    return f"{a / b:.3f}" if row.holds["survive"] and b > 0.0 and math.isfinite(a / b) else ""
+def _ratio(row: Row, a: float, b: float) -> float | None:
+    return number(a / b) if row.holds["survive"] and b > 0.0 else None
 
 
 def _word(holds: bool | None) -> str:

@@ -7,13 +7,11 @@ does not print; the ratios can be compared.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from rotorfault.base.files import write_atomically
+from rotorfault.base.csv_text import number, write_rows
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.runs import Result, Run
 
@@ -83,18 +81,18 @@ def _number(cost: float | None) -> float:
 
 def write_csv(results: Mapping[str, Result], path: Path) -> Path:
     """Write the table; costs in the cost's own unit, ratios without one, empty where there is none."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
     parts = ("paper", "matched", "equal")
     header = ["case"]
     for part in parts:
         header += [f"{part}_smc", f"{part}_roismc", f"{part}_ratio"]
     outcomes = ["matched_smc_outcome", "equal_smc_outcome", "roismc_outcome"]
-    table.writerow([*header, *outcomes])
+    lines = []
     for row in rows(results):
-        line = [row.case]
-        for costs in (row.paper, row.matched, row.equal):
-            line += [f"{costs.smc:.2f}", f"{costs.roismc:.2f}", "" if costs.ratio is None else f"{costs.ratio:.3f}"]
-        table.writerow([*line, row.matched.smc_outcome, row.equal.smc_outcome, row.equal.roismc_outcome])
-    write_atomically(path, lambda temporary: temporary.write_text(text.getvalue(), encoding="utf-8"))
-    return path
+        costs = [
+            number(cost)
+            for part in (row.paper, row.matched, row.equal)
+            for cost in (part.smc, part.roismc, part.ratio)
+        ]
+        ends = (row.matched.smc_outcome, row.equal.smc_outcome, row.equal.roismc_outcome)
+        lines.append([row.case, *costs, *ends])
+    return write_rows(path, [*header, *outcomes], lines)
