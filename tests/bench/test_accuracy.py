@@ -123,7 +123,8 @@ def test_what_is_reported(measured: dict[str, Any]) -> None:
             for errors in point["flights"].values():
                 assert 0.0 < errors["error_m"] <= errors["largest_error_m"]
         for order in curve["order"].values():
-            assert order == pytest.approx(4.0, abs=0.4)
+            # Two points give a slope; what is sampled at each step is not quite the same flight.
+            assert order == pytest.approx(4.0, abs=0.5)
     # Both curves have this point, and it is measured once.
     assert measured["curves"][SAMPLED]["points"][0] == measured["curves"][HELD]["points"][0]
 

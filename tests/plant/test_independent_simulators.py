@@ -161,10 +161,11 @@ def test_mujoco_feels_the_same_gyroscopic_torque(mujoco, spin):
             mujoco.mj_step(model, data)
             body = model_ours.after_step(
                 rk4(
-                    lambda b: model_ours.derivative(
+                    lambda b, _: model_ours.derivative(
                         b, Wrench(0.0, zeros()), zeros(), vehicle, spin, Air(zeros(), zeros())
                     ),
                     body,
+                    (None, None, None),
                     step,
                 )
             )

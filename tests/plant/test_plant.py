@@ -44,8 +44,9 @@ def test_rotor_lag_is_a_first_order_step_response_and_settles_at_the_gain_times_
     for steps in (1, 20, 100, 1000):
         _, truth = fly(plant_of(), vehicle, command, steps, start=start)
         decay = math.exp(-vehicle.rotor_bandwidth * steps * T)
-        # Local error of RK4 at w0 dt = 0.05: (w0 dt)^5 / 120 = 2.6e-9 of the deviation, 20 steps per time constant.
-        np.testing.assert_allclose(array(truth.thrust), array(command * 0.9 * (1 - decay) + start * decay), atol=1e-7)
+        np.testing.assert_allclose(
+            array(truth.thrust), array(command * 0.9 * (1 - decay) + start * decay), rtol=1e-13
+        )
         speeds = np.sqrt(array(truth.thrust) / vehicle.thrust_coefficient)
         np.testing.assert_allclose(array(truth.rotor_speed), speeds, rtol=1e-12)
 

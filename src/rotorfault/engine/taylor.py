@@ -3,7 +3,8 @@
 The closed loop is flown on Python floats, by the engine `python`; only the motion between two sampling instants is
 integrated otherwise: by the adaptive Taylor series of heyoka [1]_, whose order (about 20) and step follow from a
 tolerance near rounding. What it integrates is `Plant.derivative`, run once on heyoka's expressions, so the equations
-are those of every engine, and the integrator shares nothing with theirs.
+are those of every engine, and the integrator shares nothing with theirs. The rotor lag, which they have in closed
+form, is integrated here like the rest.
 
 Command, faults, memory of the wind and all numbers of the plant enter as values that are held over a sampling period.
 So faults must set in on sampling instants, and motion within a period must be smooth: ground contact is refused.
@@ -24,7 +25,9 @@ from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.signals import Command
-from rotorfault.plant.plant import Held, Plant, PlantParameters, PlantState, Timed
+from rotorfault.plant.faults import RotorFault
+from rotorfault.plant.plant import Held, Plant, PlantParameters, PlantState
+from rotorfault.plant.rotors import lag_derivative
 
 TOLERANCE = 1e-16  # relative to the largest coordinate, in each Taylor step
 
@@ -74,9 +77,15 @@ class _TaylorPlant:
         held = (Command(PerRotor.all(0.0), zeros()), plant.fault(0.0, memory, parameters), memory, parameters)
         x = hy.make_vars(*(name.replace(".", "_") for name in leaf_names(motion)))
         body, rotors = unflatten(motion, x)
-        numbers = unflatten(held, [hy.par[i] for i in range(len(flatten(held)))])
-        dot = plant.derivative(Timed(hy.time, body, rotors), *numbers)
-        right = [hy.expression(e) if isinstance(e, float) else e for e in flatten((dot.body, dot.rotors))]
+        numbers: tuple[Command, RotorFault, Held, PlantParameters] = unflatten(
+            held, [hy.par[i] for i in range(len(flatten(held)))]
+        )
+        command, fault, memory, parameters = numbers
+        body_dot = plant.derivative(
+            body, plant.forcing(hy.time, rotors, fault, memory, parameters), command, parameters
+        )
+        dot = (body_dot, lag_derivative(parameters.vehicle, rotors, command.thrust))
+        right = [hy.expression(e) if isinstance(e, float) else e for e in flatten(dot)]
         self._integrator = hy.taylor_adaptive(list(zip(x, right, strict=True)), [0.0] * len(x), tol=tolerance)
         self._reached = hy.taylor_outcome.time_limit
 

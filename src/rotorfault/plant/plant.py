@@ -1,8 +1,9 @@
 """The truth: body, rotors, wind, faults and ground together, one sampling period at a time.
 
-The command is held over the period, and so are the memories of wind and faults. The rotor lag is part of the
-integrated state. Wind is taken at the stage times of the integrator; faults once at the start of each sub-step, so
-that one that sets in on a sub-step's boundary acts exactly from there on and never costs the integrator its order.
+The command is held over the period, and so are the memories of wind and faults. The rotor lag is known in closed form
+and drives the body, which is integrated (`rotorfault.plant.rotors`). Wind is taken at the stage times of the
+integrator; faults once at the start of each sub-step, so that one that sets in on a sub-step's boundary acts exactly
+from there on and never costs the integrator its order.
 Ground is a choice of structure: a flight without it has none of its operations.
 """
 
@@ -21,7 +22,7 @@ from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.integrator import rk4
 from rotorfault.plant.models import BodyModel
-from rotorfault.plant.rotors import delivered_thrust, lag_derivative, true_loss, true_rotor_speeds
+from rotorfault.plant.rotors import delivered_thrust, lag_step, true_loss, true_rotor_speeds
 from rotorfault.plant.wind import Air, Wind
 
 
@@ -42,7 +43,7 @@ class Held(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """What is integrated."""
+    """What moves from one integration step to the next."""
 
     body: Any  # record of the body model
     rotors: PerRotor  # N, lag outputs v of (8)
@@ -60,12 +61,12 @@ class Truth(NamedTuple):
     ground_force: Scalar  # N, upwards
 
 
-class Timed(NamedTuple):
-    """The integrated state and its time, so that what depends on time is integrated alike."""
+class Forcing(NamedTuple):
+    """What drives the body at one time of an integration step, whatever its motion."""
 
-    time: Scalar  # s
-    body: Any
-    rotors: PerRotor  # N
+    wrench: Wrench  # of the rotors
+    residual_speed: Scalar  # rad/s
+    air: Air
 
 
 @final
@@ -175,24 +176,28 @@ class Plant:
     ) -> PlantState:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
         fault = self.fault(time, held, parameters)
+        lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
+        times = (time, time + 0.5 * dt, time + dt)
+        first, middle, last = (
+            self.forcing(at, output, fault, held, parameters) for at, output in zip(times, lag.stages, strict=True)
+        )
 
-        def derivative(at: Timed) -> Timed:
-            return self.derivative(at, command, fault, held, parameters)
+        def derivative(body: Any, forcing: Forcing) -> Any:
+            return self.derivative(body, forcing, command, parameters)
 
-        after = rk4(derivative, Timed(time, state.body, state.rotors), dt)
-        return PlantState(self.model.after_step(after.body), after.rotors)
+        body = rk4(derivative, state.body, (first, middle, last), dt)
+        return PlantState(self.model.after_step(body), lag.end)
 
-    def derivative(
-        self, at: Timed, command: Command, fault: RotorFault, held: Held, parameters: PlantParameters
-    ) -> Timed:
-        """Time derivative of what is integrated.
+    def forcing(
+        self, time: Scalar, output: PerRotor, fault: RotorFault, held: Held, parameters: PlantParameters
+    ) -> Forcing:
+        """What drives the body.
 
         Parameters
         ----------
-        at : Timed
-            Where and when.
-        command : Command
-            Within the rotor limits.
+        time : scalar, s
+        output : PerRotor, N
+            Lag outputs.
         fault : RotorFault
             Held over the integration step.
         held : Held
@@ -201,22 +206,32 @@ class Plant:
             Numbers of the truth.
         """
         vehicle = parameters.vehicle
-        thrust = delivered_thrust(vehicle, at.rotors, fault)
-        speeds = true_rotor_speeds(vehicle, at.rotors, fault)
-        wrench, extra_W = wrench_of(vehicle, thrust), command.direct_acceleration_W
+        return Forcing(
+            wrench_of(vehicle, delivered_thrust(vehicle, output, fault)),
+            residual_speed(vehicle, true_rotor_speeds(vehicle, output, fault)),
+            self.wind.at(time, held.wind, parameters.wind),
+        )
+
+    def derivative(self, body: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
+        """Time derivative of the body's state, a record of the same shape.
+
+        Parameters
+        ----------
+        body : record
+            State of the body.
+        forcing : Forcing
+            At the same time.
+        command : Command
+            Its direct acceleration is added.
+        parameters : PlantParameters
+            Numbers of the truth.
+        """
+        vehicle, wrench, extra_W = parameters.vehicle, forcing.wrench, command.direct_acceleration_W
         if self.ground is not None:
-            contact = self.ground.contact(self.model.observe(at.body), parameters.ground)
+            contact = self.ground.contact(self.model.observe(body), parameters.ground)
             wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
             extra_W = extra_W + contact.force_W / vehicle.mass
-        body_dot = self.model.derivative(
-            at.body,
-            wrench,
-            extra_W,
-            vehicle,
-            residual_speed(vehicle, speeds),
-            self.wind.at(at.time, held.wind, parameters.wind),
-        )
-        return Timed(1.0, body_dot, lag_derivative(vehicle, at.rotors, command.thrust))
+        return self.model.derivative(body, wrench, extra_W, vehicle, forcing.residual_speed, forcing.air)
 
     def observe(self, state: PlantState, held: Held, air: Air, time: Scalar, parameters: PlantParameters) -> Truth:
         """The truth at a sampling instant.

@@ -2,25 +2,95 @@ r"""Rotors: first-order lag from commanded to delivered thrust, and what a fault
 
 .. math:: \dot v_i = w_0(u_i - v_i), \qquad F_i = (1 - loss_i)\,k\,v_i
 
-Equations (7), (8) of the paper; u_i is the command within the rotor limits. Readings (docs/paper.md): a loss acts
-*after* the lag, at once; and what is lost is thrust, not speed: a rotor with a loss still spins as fast as a sound
-one with the same lag output, so rotor speeds, and with them the gyroscopic torque, belong to the sound thrust k v.
-A stuck rotor spins at the speed that gives its fixed thrust.
+Equations (7), (8) of the paper; u_i is the command within the rotor limits. It is held over an integration step, so
+the lag is known there, :math:`v(t) = u + (v(0) - u)e^{-w_0t}`, and is not integrated: it stays between its start and
+its command however fast the rotors are.
+
+The body is driven by it, and its Runge-Kutta step looks at the thrust three times only. With :math:`e^{-w_0t}` as it
+is then, the impulse of a rotor much faster than the step would be up to a sixth of the step too long. So the stages
+get weights :math:`g_0, g_1, g_2` in its place, with which the step gives velocity, path and the integral of the path
+that it causes exactly (:math:`z = w_0h`):
+
+.. math:: \tfrac16(g_0 + 4g_1 + g_2) = \varphi_1, \qquad \tfrac16(g_0 + 2g_1) = \varphi_2, \qquad
+          \tfrac1{12}(g_0 + g_1) = \varphi_3, \qquad
+          \varphi_n = \int_0^1\frac{(1-s)^{n-1}}{(n-1)!}e^{-zs}\,ds
+
+They differ from :math:`e^{-w_0t}` by :math:`O(z^2)` in such a way that the step keeps its fourth order, and vanish as
+6/z for fast rotors, which follow at once. Source of the functions: M. Hochbruck, A. Ostermann, "Exponential
+integrators", Acta Numerica 19, 2010, section 2.
+
+Readings (docs/paper.md): a loss acts *after* the lag, at once; and what is lost is thrust, not speed: a rotor with a
+loss still spins as fast as a sound one with the same lag output, so rotor speeds, and with them the gyroscopic
+torque, belong to the sound thrust k v. A stuck rotor spins at the speed that gives its fixed thrust.
 """
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import clip, maximum, select
+from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, minimum, select
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.plant.faults import RotorFault
 
 # Below this share of the greatest thrust no share of it can be named.
 _LEAST_SHARE = 0.05
+# z below which phi_3 is summed as a series, for its closed form cancels there: the sum is exact to rounding.
+_SERIES_BELOW = 0.5
+_SERIES = tuple((-1.0) ** j / math.factorial(j + 3) for j in range(14))
+
+
+class LagStep(NamedTuple):
+    """Lag outputs over an integration step, in N."""
+
+    stages: tuple[PerRotor, PerRotor, PerRotor]  # what a Runge-Kutta step is to take for them: start, middle, end
+    end: PerRotor  # at the end of the step, exactly
+
+
+def lag_step(vehicle: Vehicle, output: PerRotor, limited: PerRotor, dt: Scalar) -> LagStep:
+    """Lag outputs over a step, the commands held.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    output : PerRotor, N
+        Lag outputs v at the beginning of the step.
+    limited : PerRotor, N
+        Commands, within the limits.
+    dt : scalar, s
+        Step size.
+    """
+    z = vehicle.rotor_bandwidth * dt
+    gap = output - limited
+    first, middle, last = (limited + gap * weight for weight in stage_weights(z))
+    return LagStep((first, middle, last), limited + gap * exp(-z))
+
+
+def stage_weights(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """What stands for exp(-z s) at s = 0, 1/2 and 1 of a Runge-Kutta step, for any z > 0."""
+    small, large = minimum(z, _SERIES_BELOW), maximum(z, _SERIES_BELOW)
+    series: Scalar = 0.0
+    for coefficient in reversed(_SERIES):
+        series = series * small + coefficient
+    # Whichever phi is known, the others follow from phi_{n+1} = (1/n! - phi_n) / z, and that backwards.
+    phi_2 = 0.5 - small * series
+    summed = (1.0 - small * phi_2, phi_2, series)
+    phi_1 = (1.0 - exp(-large)) / large
+    phi_2 = (1.0 - phi_1) / large
+    closed = (phi_1, phi_2, (0.5 - phi_2) / large)
+    below = less(z, _SERIES_BELOW)
+    phi_1, phi_2, phi_3 = (select(below, a, b) for a, b in zip(summed, closed, strict=True))
+    first = 24.0 * phi_3 - 6.0 * phi_2
+    middle = 6.0 * phi_2 - 12.0 * phi_3
+    return first, middle, 6.0 * phi_1 - first - 4.0 * middle
 
 
 def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> PerRotor:
-    """Time derivative in N/s of the lag outputs v in N, for commands in N that are within the limits."""
+    """Time derivative in N/s of the lag outputs v in N, for commands in N that are within the limits.
+
+    For integrators other than the plant's own, which has the lag in closed form (`lag_step`).
+    """
     rate: PerRotor = (limited - output) * vehicle.rotor_bandwidth
     return rate
 

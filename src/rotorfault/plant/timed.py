@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, MemoryT, Nothing, OutputT, ParametersT, Record
 
-LONGEST_STEP = 0.001  # s: integration step of a scenario that gives none; rotor lags take tens of milliseconds
+LONGEST_STEP = 0.001  # s: integration step of a scenario that gives none; attitude moves in tens of milliseconds
 
 
 class TimeInputs(NamedTuple):
