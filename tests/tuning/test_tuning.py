@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,10 +16,13 @@ from rotorfault.autopilot.control.riccati_reference import solve_iterated
 from rotorfault.autopilot.control.sdre import Weights
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
+from rotorfault.flight.assembly import assemble_all, assemble_with
+from rotorfault.flight.fly import fly
 from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.records import flatten
 from rotorfault.scenario.part import part_from
 from rotorfault.tuning import search, training
-from rotorfault.tuning.space import SPACES, settings_at, space_of
+from rotorfault.tuning.space import SPACES, at_bounds, settings_at, space_of
 
 OWN = f"{EXAMPLES / 'controller.py'}:PdController"
 
@@ -56,6 +60,72 @@ def test_attitude_weights_give_the_gains_that_are_searched() -> None:
     K_angle, K_rate = feedback(problem, solve_iterated(problem))
     np.testing.assert_allclose(list(K_angle.diag), [150.0, 150.0, 30.0], rtol=1e-3)
     np.testing.assert_allclose(list(K_rate.diag), [30.0, 30.0, 12.0], rtol=1e-3)
+
+
+# ------------------------------------------------------------------------------------------- objectives and boxes
+
+
+@pytest.mark.parametrize("controller", SPACES)
+def test_the_wide_box_holds_the_standard_one_and_every_corner_is_valid(controller: str) -> None:
+    kind = CONTROLLER.registry[controller]
+    wide = space_of(controller, "wide")
+    for (key, low, start, high), (name, *bounds) in zip(SPACES[controller], wide, strict=True):
+        assert key == name
+        assert bounds[0] < low <= start == bounds[1] <= high <= bounds[2]
+    for corner in (1, 3):
+        validate(kind.Settings, settings_at(controller, {entry[0]: entry[corner] for entry in wide}), controller)
+
+
+def test_values_at_a_bound_are_named() -> None:
+    space = [("a", 1.0, 2.0, 100.0), ("b", 1.0, 2.0, 100.0), ("c", 1.0, 2.0, 100.0)]
+    assert at_bounds(space, [99.9, 10.0, 1.001]) == ["a", "c"]
+
+
+def test_objectives_differ_by_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On flights whose cost is known; a lost flight costs all of them the same."""
+    monkeypatch.setattr(training, "GROUPS", (("paper-set-point", {"duration": 2.0}, 1),))
+    groups = training.training_groups("smc", {})
+    (table,) = [settings_at("smc", {entry[0]: entry[2] for entry in SPACES["smc"]})]
+    (one,) = groups[0]
+    ours = one.model_copy(update={"controller": part_from(CONTROLLER, {"kind": "smc", "preset": "none", **table})})
+    J = fly(ours).summary()["cost"]
+    worth = {
+        name: search._evaluate("smc", [table], groups, kind.worth)[0] for name, kind in training.OBJECTIVES.items()
+    }
+    assert worth["cost"] == pytest.approx(np.log10(J), rel=1e-9)
+    assert worth["balanced"] - worth["without-cost"] == pytest.approx(0.3 * np.log10(1.0 + J), rel=1e-9)
+    gone = {"survived": False}
+    known: Any = {"controller.virtual_position": None}
+    assert {kind.worth(ours, known, gone) for kind in training.OBJECTIVES.values()} == {training.LOST}
+    with pytest.raises(InputError, match="objective 'cost' needs a controller that records virtual_position"):
+        training.cost_alone(ours, cast("Any", {}), {"survived": True, "cost": J})
+
+
+def test_unknown_objectives_and_boxes_are_refused() -> None:
+    with pytest.raises(InputError, match="did you mean 'balanced'"):
+        search.tune("smc", 1, 4, objective="balancd")
+    with pytest.raises(InputError, match=r"box 'huge'.*standard, wide"):
+        space_of("smc", "huge")
+    with pytest.raises(InputError, match="wider bounds into `search` of your class"):
+        space_of(OWN, "wide")
+
+
+def test_candidates_fly_together_as_they_fly_apart() -> None:
+    group = training.training_groups("smc", {"duration": 2.0}, neighbours=2)[0]
+    tables = [
+        settings_at("smc", {entry[0]: entry[2] * scale for entry in SPACES["smc"]} | {"cascade.thrust_share": 0.9})
+        for scale in (1.0, 1.1, 0.9)
+    ]
+    parts = [part_from(CONTROLLER, {"kind": "smc", "preset": "none", **table}) for table in tables]
+    apart = assemble_all([one.model_copy(update={"controller": part}) for part in parts for one in group])
+    together = assemble_with(group, CONTROLLER, parts)
+    for whole, other in ((apart.state, together.state), (apart.parameters, together.parameters)):
+        for a, b in zip(flatten(whole), flatten(other), strict=True):
+            np.testing.assert_array_equal(np.broadcast_to(a, (6,)), np.broadcast_to(b, (6,)))
+    assert apart.seeds == together.seeds
+    sgn = part_from(CONTROLLER, {"kind": "smc", "preset": "none", "law": {"switching": "discontinuous"}})
+    with pytest.raises(InputError, match="differ in more than numbers"):
+        assemble_with(group, CONTROLLER, [parts[0], sgn, parts[1]])
 
 
 # ------------------------------------------------------------------------------------------ controllers of one's own

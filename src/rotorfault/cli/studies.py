@@ -55,6 +55,10 @@ def tune(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Override a key of all training flights; may be repeated."),
     ] = None,
+    objective: Annotated[
+        str, typer.Option(help="What the search is for: balanced (the shipped presets), cost or without-cost.")
+    ] = "balanced",
+    box: Annotated[str, typer.Option(help="Bounds of the search: standard, or wide.")] = "standard",
     name: Annotated[str, typer.Option(help="Name of the preset to write.")] = "tuned",
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="TOML file to write; printed if not given.")
@@ -77,7 +81,9 @@ def tune(
     if out is not None:
         output_folder(out.parent)
     with Bar(f"tuning {controller}", generations, "generations") as bar:
-        tuned = search.tune(controller, generations, population, seed, settings, lambda done, _: bar.update(done))
+        tuned = search.tune(
+            controller, generations, population, seed, settings, lambda done, _: bar.update(done), objective, box
+        )
     text = search.as_toml(tuned, name)
     if out is None:
         typer.echo(text)

@@ -15,15 +15,16 @@ from rotorfault._version import __version__
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.foreign import is_place
 from rotorfault.engine import default_engine, load_engine
-from rotorfault.engine.batch import no_watch
-from rotorfault.flight.assembly import assemble_all
+from rotorfault.engine.batch import Batch, no_watch
+from rotorfault.flight.assembly import assemble_all, assemble_with
 from rotorfault.maths.arrays import Array
+from rotorfault.model.telemetry import Layout
 from rotorfault.results.flight_data import flight_data
 from rotorfault.results.score_table import score_table
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import Scenario
-from rotorfault.tuning.space import SPACES, settings_at, space_of
-from rotorfault.tuning.training import objective, training_groups
+from rotorfault.tuning.space import SPACES, at_bounds, settings_at, space_of
+from rotorfault.tuning.training import NEEDED, balanced, objective_of, training_groups
 
 # Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which
 # flies, and not at the bounds.
@@ -45,6 +46,9 @@ def tune(
     seed: int = 1,
     overrides: dict[str, Any] | None = None,
     report: Callable[[int, float], None] | None = None,
+    objective: str = "balanced",
+    box: str = "standard",
+    neighbours: int | None = None,
 ) -> Tuned:
     """Search the gains of a controller.
 
@@ -60,6 +64,12 @@ def tune(
         Dotted keys and values for all training flights, such as ``{"vehicle": "hummingbird"}``.
     report : callable, optional
         Called with the generations done and the best objective so far.
+    objective : str
+        What the search is for: one of `rotorfault.tuning.training.OBJECTIVES`.
+    box : str
+        Bounds of the search: one of `rotorfault.tuning.space.BOXES`.
+    neighbours : int, optional
+        Training flights in each group, at most; as many as the presets were found with if not given.
 
     Returns
     -------
@@ -71,12 +81,15 @@ def tune(
     InputError
         If there is no search space for the controller, or it cannot be flown in a batch.
     """
-    space = space_of(controller)
-    groups = training_groups(controller, overrides or {})
+    space, worth = space_of(controller, box), objective_of(objective).worth
+    groups = training_groups(controller, overrides or {}, neighbours)
     low, start, high = (np.log([entry[i] for entry in space]) for i in (1, 2, 3))
 
+    def values(x: Array) -> Array:
+        return np.asarray(np.exp(low + np.clip(x, 0.0, 1.0) * (high - low)))
+
     def tables(x: Array) -> dict[str, Any]:
-        point = np.exp(low + np.clip(x, 0.0, 1.0) * (high - low))
+        point = values(x)
         return settings_at(controller, {entry[0]: float(p) for entry, p in zip(space, point, strict=True)})
 
     search = cma.CMAEvolutionStrategy(
@@ -88,7 +101,7 @@ def tune(
     try:
         while done < generations:
             points = search.ask()
-            search.tell(points, _evaluate(controller, [tables(x) for x in points], groups))
+            search.tell(points, _evaluate(controller, [tables(x) for x in points], groups, worth))
             done += 1
             if report is not None:
                 report(done, float(search.result.fbest))
@@ -101,6 +114,9 @@ def tune(
         "population": population,
         "seed": seed,
         "flights_per_candidate": sum(map(len, groups)),
+        "searched_for": objective,
+        "box": box,
+        "at_bounds": at_bounds(space, [float(value) for value in values(search.result.xbest)]),
         "objective": round(float(search.result.fbest), 4),
         "version": __version__,
         **({"overrides": dict(overrides)} if overrides else {}),
@@ -108,24 +124,36 @@ def tune(
     return Tuned(controller, tables(search.result.xbest), record)
 
 
-def _evaluate(controller: str, candidates: list[dict[str, Any]], groups: list[list[Scenario]]) -> list[float]:
+def _evaluate(
+    controller: str,
+    candidates: list[dict[str, Any]],
+    groups: list[list[Scenario]],
+    worth: Callable[..., float] = balanced,
+) -> list[float]:
     """Mean objective of each candidate; the groups count alike."""
     total = np.zeros(len(candidates))
+    start = {"kind": controller} | ({"preset": "none"} if controller in SPACES else {})
+    parts = [part_from(CONTROLLER, {**start, **table}, allow=(controller,)) for table in candidates]
     for group in groups:
-        start = {"kind": controller} | ({"preset": "none"} if controller in SPACES else {})
-        parts = [part_from(CONTROLLER, {**start, **table}, allow=(controller,)) for table in candidates]
         scenarios = [one.model_copy(update={CONTROLLER.name: part}) for part in parts for one in group]
-        batch = assemble_all(scenarios)
+        whole = assemble_with(group, CONTROLLER, parts) if controller in SPACES else assemble_all(scenarios)
+        known = Layout(tuple(signal for signal in whole.loop.layout.signals if signal.name in NEEDED))
+        batch = whole._replace(wanted=tuple(row for s in known.signals for row in _rows(whole, s.name)))
         recording = load_engine(default_engine(len(scenarios)))(batch, no_watch)
         if recording.interrupted:
             raise KeyboardInterrupt  # half a flight must not be judged
         times, table = recording.steps * group[0].period, score_table(batch, recording.state)
         scores = [
-            objective(one, flight_data(batch.loop.layout, recording.signals[:, :, i], times, {}), table.row(i))
+            worth(one, flight_data(known, recording.signals[:, :, i], times, {}), table.row(i))
             for i, one in enumerate(scenarios)
         ]
         total += np.array(scores).reshape(len(candidates), len(group)).mean(axis=1)
     return [float(x) for x in total / len(groups)]
+
+
+def _rows(batch: Batch, name: str) -> range:
+    place = batch.loop.layout.place(name)
+    return range(place.start, place.stop)
 
 
 def as_toml(tuned: Tuned, name: str) -> str:

@@ -10,13 +10,15 @@ A controller of a user's own says itself what may be searched (`Controller.searc
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.ismc import IsmcSettings
 from rotorfault.autopilot.control.roismc import RoismcSettings
 from rotorfault.autopilot.control.sdre import Weights
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.foreign import is_place
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import part_from
@@ -64,21 +66,34 @@ SPACES: dict[str, Space] = {
 }  # fmt: skip
 
 
-def space_of(controller: str) -> Space:
+# The wide box of a law reaches this many times further down and up, as far as settings are allowed.
+WIDER = 4.0
+BOXES = ("standard", "wide")
+ALLOWED = {"cascade.tilt_max": 1.45, "cascade.fall_share": 0.95, "cascade.thrust_share": 1.0}
+AT_BOUND = 0.01  # of the range, on the searched scale: nearer to a bound than this, a value may want to be beyond it
+
+
+def space_of(controller: str, box: str = "standard") -> Space:
     """What may be searched of a controller.
 
     Parameters
     ----------
     controller : str
         Registered name, or a place in code, which is run.
+    box : str
+        One of `BOXES`: the bounds with which the presets were found, or wider ones.
 
     Raises
     ------
     InputError
-        If it says nothing of a search, or gives bounds that are none.
+        If it says nothing of a search, or gives bounds that are none, or there is no such box.
     """
+    if box not in BOXES:
+        raise InputError(unknown("box", box, list(BOXES)))
     if controller in SPACES:
-        return SPACES[controller]
+        return SPACES[controller] if box == "standard" else [_wide(*entry) for entry in SPACES[controller]]
+    if box != "standard" and is_place(controller):
+        raise InputError(f"box '{box}' is for {', '.join(SPACES)}; write wider bounds into `search` of your class")
     if not is_place(controller):
         raise InputError(
             f"controller '{controller}' has no search space; allowed: {', '.join(SPACES)}, or FILE.py:NAME"
@@ -96,6 +111,27 @@ def space_of(controller: str) -> Space:
                 "allowed: lowest, first and highest value, above 0 and in order"
             )
     return [(key, *bounds) for key, bounds in ranges.items()]
+
+
+def _wide(key: str, low: float, start: float, high: float) -> tuple[str, float, float, float]:
+    return key, low / WIDER, start, min(high * WIDER, ALLOWED.get(key, math.inf))
+
+
+def at_bounds(space: Space, values: Sequence[float]) -> list[str]:
+    """Keys whose values lie at a bound of a space, where the search may have wanted to go on.
+
+    Parameters
+    ----------
+    space : Space
+    values : sequence of float
+        In the order of the space.
+    """
+    found = []
+    for (key, low, _, high), value in zip(space, values, strict=True):
+        share = math.log(value / low) / math.log(high / low)
+        if not AT_BOUND <= share <= 1.0 - AT_BOUND:
+            found.append(key)
+    return found
 
 
 def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:

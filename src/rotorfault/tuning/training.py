@@ -15,16 +15,20 @@ Objective of a flight, the smaller the better, in seconds or what is taken for o
 
 The weights are our choice; nobody prescribes them. The `tuned` presets were found with them, so that they must not
 change without a new search for every controller. Beside each stands what it trades.
+
+`OBJECTIVES` names what a search may be for. What the ratio of two laws owes to that choice is shown by
+`rotorfault.studies.paper.ranges`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rotorfault.base.errors import InputError, unknown
 from rotorfault.loop.scores import SETTLED
 from rotorfault.maths.arrays import Array
 from rotorfault.plant import FAULT
@@ -52,6 +56,11 @@ COST_WEIGHT = 0.3
 TILT_FREE = 1.1  # rad; the largest demand that a search may allow, see `cascade.tilt_max` in the search space
 # Per decade of (rad/s^2)^2: settles between flights that are alike in all else, in favour of the quieter one.
 EFFORT_WEIGHT = 0.04
+# Signals that objectives read, as far as a controller has them.
+NEEDED = (
+    "position", "position_reference", "fault_flag", "torque_demand", "controller.virtual_attitude",
+    "controller.virtual_position",
+)  # fmt: skip
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
 _FAULTY = np.array([1.0, 0.0, 1.0, 0.0])
 
@@ -64,7 +73,9 @@ GROUPS: tuple[tuple[str, dict[str, Any], int], ...] = (
 )
 
 
-def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Scenario]]:
+def training_groups(
+    controller: str, overrides: dict[str, Any], neighbours: int | None = None
+) -> list[list[Scenario]]:
     """Training flights in groups that fly in one batch each.
 
     Parameters
@@ -72,6 +83,8 @@ def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Sce
     controller : str
     overrides : dict
         Dotted keys and values for all flights, such as another vehicle.
+    neighbours : int, optional
+        At most so many in each group; as many as the presets were found with if not given.
     """
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([FIRST_SEED])))
     groups = []
@@ -79,7 +92,7 @@ def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Sce
         settings = {"controller.kind": controller, "record_period": 0.01, **own, **overrides}
         base = load_scenario(name, settings)
         group = []
-        for i in range(count):
+        for i in range(count if neighbours is None else min(count, neighbours)):
             one = neighbour(base, seed=FIRST_SEED + i)
             lag = float(draw.uniform(0.75, 1.25))
             group.append(
@@ -89,7 +102,16 @@ def training_groups(controller: str, overrides: dict[str, Any]) -> list[list[Sce
     return groups
 
 
-def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
+class Objective(NamedTuple):
+    """What a search is for."""
+
+    says: str  # in a line, for people
+    worth: Callable[[Scenario, FlightData, Mapping[str, Any]], float]  # of a flight, smaller is better
+
+
+def balanced(
+    scenario: Scenario, data: FlightData, scores: Mapping[str, Any], cost_weight: float = COST_WEIGHT
+) -> float:
     """What one flight is worth.
 
     Parameters
@@ -100,6 +122,8 @@ def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -
         Its records.
     scores : mapping
         Its row of a score table.
+    cost_weight : float
+        Of log10(1 + J).
     """
     if not scores["survived"]:
         return LOST
@@ -118,10 +142,54 @@ def objective(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -
     return float(
         worth
         + float(wrong)
-        + (COST_WEIGHT * math.log10(1.0 + scores["cost"]) if "controller.virtual_position" in data else 0.0)
+        + (cost_weight * math.log10(1.0 + scores["cost"]) if "controller.virtual_position" in data else 0.0)
         + max(0.0, float(scores["tilt_max"]) - TILT_FREE)
         + EFFORT_WEIGHT * math.log10(1.0 + float(np.mean(virtual**2)))
     )
+
+
+def without_cost(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
+    """`balanced` with no weight on the cost J."""
+    return balanced(scenario, data, scores, cost_weight=0.0)
+
+
+def cost_alone(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
+    """log10 J: a search for the cost alone, in which a case of small J counts as much as one of large J.
+
+    Raises
+    ------
+    InputError
+        If the controller has no cost.
+    """
+    if "controller.virtual_position" not in data:
+        raise InputError(
+            "objective 'cost' needs a controller that records virtual_position, of which the cost J is made; "
+            "allowed for this one: balanced, without-cost"
+        )
+    # The floor keeps the logarithm of a flight without error and input a number.
+    return math.log10(max(float(scores["cost"]), 1e-6)) if scores["survived"] else LOST
+
+
+OBJECTIVES: dict[str, Objective] = {
+    "balanced": Objective(
+        "time to settle and tracking error, with the cost J a quarter: the shipped presets", balanced
+    ),
+    "cost": Objective("the cost J alone", cost_alone),
+    "without-cost": Objective("as balanced, with no weight on J", without_cost),
+}
+
+
+def objective_of(name: str) -> Objective:
+    """An objective by its name.
+
+    Raises
+    ------
+    InputError
+        If there is none of this name.
+    """
+    if name not in OBJECTIVES:
+        raise InputError(unknown("objective", name, list(OBJECTIVES)))
+    return OBJECTIVES[name]
 
 
 def _settling(error: Array, times: Array, onset: float, k: int) -> float:

@@ -88,9 +88,33 @@ def test_time_outside_the_layer_and_reaching_of_smc() -> None:
 def test_disturbance_of_a_lost_rotor_is_what_its_torque_gives() -> None:
     data = made_up(expected_thrust_r3=4.0, thrust_r3=2.6, loss_believed_r3=0.25, disturbance_y=-0.5)
     found = measure(data)["disturbance"]
-    assert found["attitude"] == pytest.approx(0.42 * 1.4 / 2.16e-3)
-    assert found["attitude_unexplained"] == pytest.approx(0.42 * 0.4 / 2.16e-3)
-    assert found["position"] == pytest.approx(0.5)
+    assert found["attitude_whole"] == pytest.approx(0.42 * 1.4 / 2.16e-3)
+    assert found["attitude"] == pytest.approx(0.42 * 0.4 / 2.16e-3)
+    assert found["wind"] == pytest.approx(0.5)
+    lost: dict[str, Any] = {"expected_thrust_r3": 4.0, "thrust_r3": 2.0, "loss_believed_r3": 0.1}
+    # Level, so that lost thrust pulls along z: 1.6 N of a vehicle of 1.77 kg; tilted by 90 degrees, along y.
+    level = measure(made_up(**lost, disturbance_z=-0.5, quaternion_w=1.0))["disturbance"]
+    assert level["position"] == pytest.approx(1.6 / 1.77 + 0.5)
+    half = np.sqrt(0.5)
+    lying = measure(made_up(**lost, quaternion_w=half, quaternion_x=half, disturbance_z=-0.5))["disturbance"]
+    assert lying["position"] == pytest.approx(1.6 / 1.77)
+
+
+def test_lean_is_what_is_left_of_what_trajectory_and_wind_ask_for() -> None:
+    """In still air a reference that accelerates at g along x asks for 45 degrees of pitch."""
+    asked: dict[str, Any] = {
+        "acceleration_reference_x": 9.81,
+        "controller__attitude_demand_y": 0.0,
+        "loss_true_r1": 0.25,
+    }
+    found = measure(made_up(**asked, attitude_y=np.pi / 4.0))
+    assert found["lean_after"] == pytest.approx(0.0, abs=1e-9)
+    assert found["lean_time"] == 0.0
+    late = measure(made_up(**asked, attitude_y=lambda t: np.pi / 4.0 + np.where(t < 7.0, 0.1, 0.0)))
+    assert late["lean_after"] == pytest.approx(0.1)
+    assert late["lean_time"] == pytest.approx(7.0)
+    blown = measure(made_up(disturbance_x=-9.81, attitude_y=np.pi / 4.0))
+    assert blown["lean_time"] == 0.0
 
 
 def test_cost_readings_change_what_they_say_and_nothing_else() -> None:

@@ -86,9 +86,10 @@ def test_first_reading_decides_and_others_are_named() -> None:
 
 @pytest.mark.parametrize(
     ("ours", "theirs", "holds"), [(1.0, 2.0, True), (2.0, 1.0, False), (None, 1.0, False), (1.0, None, True),
-                                  (None, None, False), (1.0, 1.0, False)]
+                                  (None, None, False), (1.0, 1.0, False), (0.0, 0.0, False),
+                                  (0.96, 1.0, False), (0.94, 1.0, True), (8.597e-9, 8.599e-9, False)]
 )  # fmt: skip
-def test_lower_treats_never_as_larger(
+def test_lower_needs_the_margin_and_treats_never_as_larger(
     template: dict[str, Result], ours: float | None, theirs: float | None, holds: bool
 ) -> None:
     a, b = template["set-point-roismc"], template["set-point-smc"]
@@ -155,9 +156,11 @@ def test_growth_with_the_wind(results: dict[str, Result]) -> None:
 
     up, down = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [6.0, 5.0, 4.0, 3.0, 2.0, 1.0]
     grows, falls = swept(up, [1.0, 1.1, 1.2, 1.3, None, None]), swept(up, down)
-    assert verdict(wind_sweep.growth(*grows, *falls, *falls)) == CONFIRMED
-    assert verdict(wind_sweep.growth(*falls, *grows, *falls)).startswith("confirmed under reading 'k_d")
-    assert verdict(wind_sweep.growth(*[crash(r) for r in grows], *falls, *falls)) == NOT_CONFIRMED
+    assert verdict(wind_sweep.growth(*grows, *falls)) == CONFIRMED
+    assert verdict(wind_sweep.growth(*falls, *grows)).startswith("confirmed under reading 'k_d")
+    assert verdict(wind_sweep.growth(*[crash(r) for r in grows], *falls)) == NOT_CONFIRMED
+    hardly = swept([1.0, 1.01, 1.02, 1.03, 1.04, 1.04], [1.0, 1.1, 1.2, 1.3, 1.4, 1.5])
+    assert verdict(wind_sweep.growth(*hardly, *falls)) == NOT_CONFIRMED
     assert wind_sweep.rank_correlation(up) == pytest.approx(1.0)
     assert wind_sweep.rank_correlation([2.0] * 6) == 0.0
 

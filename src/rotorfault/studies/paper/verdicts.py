@@ -2,6 +2,16 @@
 
 A claim is *confirmed* if it holds under the project's own reading, the first one; *confirmed under reading X* if it
 holds only under others; else *not confirmed*. A rule never raises on a lost flight: that is a result.
+
+Three things keep verdicts from being kind:
+
+- **One margin.** A number counts as lower than another, or as within a bound, if it is so by `MARGIN` at least; what
+  differs by less is the same number. The paper's own differences are of 7 % and more.
+- **A reading reads the paper.** It takes a word, a formula or a number of the paper in another sense that it could
+  have. Another threshold, or another quantity than the sentence is about, is another rule and no reading.
+- **A way to fail.** Where a flight would pass that has nothing to do with what the claim credits, the rule flies a
+  control that must fail; if that passes too, the claim is not confirmed. The tests feed each judge numbers that
+  contradict it.
 """
 
 from __future__ import annotations
@@ -17,6 +27,9 @@ from rotorfault.studies.runs import Result, Run
 CONFIRMED, NOT_CONFIRMED, UNDER = "confirmed", "not confirmed", "confirmed under reading "
 LOST_IS_WORSE = "a lost flight counts as worse"
 FAR = 10.0  # m
+# Of the larger number. Less than that nobody would call lower, and a change of a model's details or of the search for
+# the gains moves most numbers by more.
+MARGIN = 0.05
 
 
 class Reading(NamedTuple):
@@ -115,10 +128,19 @@ def text(value: float | None, digits: int = 3) -> str:
     return "never" if value is None else f"{value:.{digits}g}"
 
 
-def lower(
-    name: str, ours: Result, theirs: Result, value: Callable[[Result], float | None], least: float = 0.0
-) -> list[Reading]:
-    """Whether a number of ROISMC's flight lies below SMC's by a share of at least `least`.
+def below(value: float | None, bound: float | None) -> bool:
+    """Whether a number lies below another, or within a bound, by the margin; None is larger than any number.
+
+    Parameters
+    ----------
+    value, bound : float or None
+        Of the same unit, 0 or more.
+    """
+    return value is not None and (bound is None or value <= (1.0 - MARGIN) * bound) and value != bound
+
+
+def lower(name: str, ours: Result, theirs: Result, value: Callable[[Result], float | None]) -> list[Reading]:
+    """Whether a number of ROISMC's flight lies below SMC's by the margin.
 
     A value of None (never settled, no number) is larger than any number. Numbers of flights of different length are
     not compared: with SMC lost and ROISMC flying on, the claim holds only as "a lost flight counts as worse".
@@ -131,9 +153,9 @@ def lower(
         return [Reading(name, measured, False), Reading(label, "ROISMC flies on, SMC does not", True)]
     a, b = value(ours), value(theirs)
     if a is None or b is None:
-        return [Reading(name, f"ROISMC {text(a)}, SMC {text(b)}", a is not None)]
+        return [Reading(name, f"ROISMC {text(a)}, SMC {text(b)}", below(a, b))]
     ratio = f", ratio {a / b:.3f}" if b > 0.0 else ""
-    return [Reading(name, f"ROISMC {a:.4g}, SMC {b:.4g}{ratio}", a < b * (1.0 - least))]
+    return [Reading(name, f"ROISMC {a:.4g}, SMC {b:.4g}{ratio}", below(a, b))]
 
 
 def extra(*keys: str) -> Callable[[Result], Any]:
