@@ -97,8 +97,8 @@ def ending(**values: Any) -> tuple[str, float]:
 
 def test_losses_are_named_and_dated() -> None:
     assert ending() == ("settled", pytest.approx(10.1))
-    assert ending(position=[0.0, 0.0, -1.0])[0] == "offset"  # on the ground is not below it
-    below = steps((30, [0.0] * 3), (71, [0.0, 0.0, -1.001]))
+    assert ending(position=[0.0, 0.0, -1.002])[0] == "offset"  # on the ground, with springs that give way
+    below = steps((30, [0.0] * 3), (71, [0.0, 0.0, -1.2]))
     assert ending(position=below) == ("ground", pytest.approx(3.0))
     assert scored(position=below)["outcome"] == "offset"
     # A tilt beyond 90 degrees, also where roll and pitch both turn over and the thrust axis points up again.

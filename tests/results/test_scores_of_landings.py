@@ -27,13 +27,18 @@ DOWN: dict[str, Any] = {
         ({"attitude": [0.0, 0.27, 0.0]}, True),
         # Contact has braked it by the instant at which it shows.
         ({"velocity": np.outer(FORCE == 0.0, [0.0, 0.0, -3.0])}, True),
-        # Without a landing, below the ground is a crash.
-        ({"landing_stage": 0.0}, True),
+        # Pressed into the ground by more than its legs are long.
+        ({"position": np.outer(FORCE > 0.0, [0.0, 0.0, -0.2])}, True),
+        # A touch that cannot be felt is none: 0.1 N of 17.
+        ({"velocity": [2.0, 0.0, 0.0], "ground_force": 0.01 * FORCE}, False),
+        # Nobody knows of one that is no number.
+        ({"velocity": [2.0, 0.0, 0.0], "ground_force": np.where(FORCE > 0.0, np.nan, 0.0)}, True),
     ],
 )
-def test_a_touch_is_gentle_or_a_crash(more: dict[str, Any], crashed: bool) -> None:
-    """At 0.5 s the ground is touched, during a landing; its limits are on speed down, sideways, and tilt."""
-    row = scored(tables=LANDING, **{**DOWN, **more})
+@pytest.mark.parametrize("stage", [0.0, 1.0])
+def test_a_touch_is_gentle_or_a_crash(more: dict[str, Any], crashed: bool, stage: float) -> None:
+    """At 0.5 s the ground is touched, in a landing or not; the limits are on speed down, sideways, tilt and depth."""
+    row = scored(tables=LANDING, **{**DOWN, "landing_stage": stage, **more})
     assert (row["outcome"] == "ground") is crashed, row["outcome"]
     if crashed:
         assert row["end_time"] == pytest.approx(0.5)

@@ -281,7 +281,7 @@ class _Assembly:
         loop = ClosedLoop(parts_of(scenario, self.own), scenario.substeps, source.Telemetry)
         reference = reference_of(scenario, source)
         parameters = self.parameters(loop)
-        believed = parameters.belief
+        believed, true = parameters.belief, parameters.vehicle
         start = self.numbers(("start",), lambda s: start_of(scenario.model_copy(update={"start": s})))
         position = np.stack([np.broadcast_to(x, (self.count,)) for x in start.p_W], axis=-1)
         ground = loop.maybe(GROUND)
@@ -289,7 +289,8 @@ class _Assembly:
             position if self.count > 1 else position[0],
             believed.thrust_min,
             believed.thrust_max,
-            0.0 if ground is None else ground.height(parameters.parts.ground),
+            0.0 if ground is None else ground.bottom(parameters.parts.ground),
+            true.mass * true.gravity,
             reference,
         )
         parameters = parameters._replace(scoring=scoring)

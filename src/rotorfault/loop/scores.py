@@ -22,6 +22,9 @@ FAR = 1e4  # m; beyond any scenario: what diverges
 SPEED_MAX = 1.0  # m/s, downwards at touch-down: as after a fall from 5 cm
 SLIDE_MAX = 0.5  # m/s, horizontal; half of the vertical, for feet catch sideways
 TILT_MAX = math.radians(15.0)  # at touch-down; beyond it a vehicle of usual proportions tips over its feet
+# Of the weight: an upward force of the ground from which on a vehicle touches it. At rest that is a depth of 0.02 mm;
+# what is less is no touch but rounding, or the last of a bounce.
+TOUCH = 0.01
 REST = 0.5  # s that a landed vehicle must stand with rotors stopped, longer than a bounce; then the flight is over
 AT_LIMIT = 1e-9  # of the largest command: below it a difference from a limit is rounding
 # m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that
@@ -48,12 +51,13 @@ class ScoringParameters(NamedTuple):
     half: Scalar  # number of the step with which the last half begins
     command_low: Scalar  # N: commands at or below count as saturated
     command_high: Scalar  # N: commands at or above do
-    ground: Scalar  # m; unread without ground
+    bottom: Scalar  # m: height below which the vehicle is in the ground, not on it; unread without ground
+    touch: Scalar  # N: upward force of the ground with which it touches; unread without ground
 
 
 def unjudged() -> ScoringParameters:
     """For a loop whose scores nobody reads."""
-    return ScoringParameters(zeros(), zeros(), 0.0, 0.0, math.inf, 0.0)
+    return ScoringParameters(zeros(), zeros(), 0.0, 0.0, math.inf, 0.0, 0.0)
 
 
 class Detection(NamedTuple):
@@ -141,7 +145,8 @@ def scoring_parameters(
     position: NDArray[np.float64],
     thrust_min: Scalar,
     thrust_max: Scalar,
-    ground: Scalar,
+    bottom: Scalar,
+    weight: Scalar,
     reference: NDArray[np.float64],
 ) -> ScoringParameters:
     """What scoring needs to know of a flight.
@@ -152,8 +157,10 @@ def scoring_parameters(
         Where it begins, in m.
     thrust_min, thrust_max : scalar, N
         Limits of a rotor's command, as the autopilot believes.
-    ground : scalar, m
-        Height of the ground; unread where there is none.
+    bottom : scalar, m
+        Height below which the vehicle is in the ground; unread where there is none.
+    weight : scalar, N
+        The true one.
     reference : ndarray, shape (steps, 3 or more)
         Its first three columns are positions in m.
     """
@@ -165,5 +172,6 @@ def scoring_parameters(
         half=float(len(reference) // 2),
         command_low=thrust_min + margin,
         command_high=thrust_max - margin,
-        ground=ground,
+        bottom=bottom,
+        touch=TOUCH * weight,
     )

@@ -4,9 +4,10 @@ Pure functions on scalars, so that every engine counts alike, a batch of a hundr
 and a flight has one set of numbers whatever of it is recorded and how finely.
 
 - *Outcome*: ``diverged`` (a number of the true state is not finite, or it is further than 10 km away), ``tumbled``
-  (tilt beyond 90 degrees) or ``ground`` (crash: below the ground without a landing under way, or touched it during a
-  landing faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees) end a flight; so does ``landed``
-  (touched it more gently than that, and stood there with rotors stopped for 0.5 s). A flight that lasts to its end is
+  (tilt beyond 90 degrees) or ``ground`` (crash: touched the ground faster than 1 m/s down or 0.5 m/s sideways, or
+  tilted beyond 15 degrees, or sank into it by the length of its legs) end a flight; so does ``landed`` (touched it
+  more gently than that in a landing, and stood there with rotors stopped for 0.5 s). It touches where the ground
+  pushes it up with 1 % of its weight or more. A flight that lasts to its end is
   ``settled`` (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square
   error over the last half within 5 % of the reference's span on every axis) or ``offset`` (neither). It has
   *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is ``interrupted``.
@@ -150,15 +151,15 @@ class Scoring:
         standing: Scalar = 1.0
         if self.ground:
             stage = signals.landing_stage if self.lands else 0.0
-            touching = negated(less_equal(signals.ground_force, 0.0))
+            touching = _touching(signals, parameters)
             landing = greater(stage, 0.5)
             gentle = both(
                 less_equal(-signals.velocity.z, SPEED_MAX), less_equal(_horizontal(signals.velocity), SLIDE_MAX)
             )
             # Contact may have braked it already: the instant before counts as well.
             soft = both(both(gentle, scores.gentle), greater_equal(cosine, math.cos(TILT_MAX)))
-            above = greater_equal(signals.position.z, parameters.ground)
-            standing = select(landing, negated(both(touching, negated(soft))), above)
+            above = greater_equal(signals.position.z, parameters.bottom)
+            standing = both(above, negated(both(touching, negated(soft))))
             touched = either(scores.touched, both(landing, touching))
             resting = both(touching, greater(stage, 1.5))
             # Counted from the first instant at rest, which itself adds nothing.
@@ -180,7 +181,7 @@ class Scoring:
             error = signals.position - signals.position_reference
             ending = after._replace(position_error=error, attitude=signals.quaternion, velocity=signals.velocity)
             if self.lands:
-                ending = ending._replace(landing=self._land(scores, signals, begun, time))
+                ending = ending._replace(landing=self._land(scores, signals, parameters, begun, time))
             after = select_record(counted, ending, after)
         return after._replace(
             over=select(flying, code, scores.over),
@@ -320,12 +321,14 @@ class Scoring:
             largest = maximum(largest, leaf)
         return select(first, largest, maximum(old, largest))
 
-    def _land(self, scores: Scores, signals: Any, begun: dict[int, Scalar], time: Scalar) -> Landing:
+    def _land(
+        self, scores: Scores, signals: Any, parameters: ScoringParameters, begun: dict[int, Scalar], time: Scalar
+    ) -> Landing:
         """What is known of a landing after this instant."""
         old: Any = scores.landing
         stage = signals.landing_stage
         landing, stopped = greater(stage, 0.5), greater(stage, 1.5)
-        touching = both(landing, negated(less_equal(signals.ground_force, 0.0)))
+        touching = both(landing, _touching(signals, parameters))
         touches = both(touching, less(old.touched, -0.5))
         struck = any_of(begun.values())
         starts = both(landing, less(old.begun, -0.5))
@@ -354,6 +357,11 @@ def _true_state_is_finite(signals: Any) -> Scalar:
     for row in rows[1:]:
         total = total + row  # infinite or NaN where any is
     return is_finite(total)
+
+
+def _touching(signals: Any, parameters: ScoringParameters) -> Scalar:
+    """1 where the vehicle touches the ground so that it can be felt, or where nobody knows."""
+    return negated(less(signals.ground_force, parameters.touch))
 
 
 def _inside(v: Vec3, limit: float) -> Scalar:

@@ -34,6 +34,7 @@ from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT
 from rotorfault.model.signals import State
 from rotorfault.model.slot import Slot, register
 
+DEEPEST = 0.1  # m below where it stands, of a vehicle whose legs are not known: about the leg of a 1 kg vehicle
 LARGEST_STEP = 0.005  # s: see `Ground.longest_step`; for the default gear
 
 
@@ -60,8 +61,12 @@ class Ground(Block[State, Contact, MemoryT, ParametersT]):
         raise NotImplementedError(f"{type(self).__name__} has no contact")
 
     def height(self, parameters: ParametersT) -> Scalar:
-        """Height in m of the centre of mass when the vehicle stands on it; below it a flight is lost."""
+        """Height in m of the centre of mass when the vehicle stands on it."""
         raise NotImplementedError(f"{type(self).__name__} has no height")
+
+    def bottom(self, parameters: ParametersT) -> Scalar:
+        """Height in m of the centre of mass below which the vehicle is in the ground, and its flight lost."""
+        return self.height(parameters) - DEEPEST
 
     def longest_step(self) -> float:
         """Integration step in s up to which contact is stable with room to spare."""
@@ -140,6 +145,10 @@ class Level(Ground[Nothing, GroundParameters]):
     def height(self, parameters: GroundParameters) -> Scalar:
         """The same everywhere."""
         return parameters.height
+
+    def bottom(self, parameters: GroundParameters) -> Scalar:
+        """Where the centre of mass is at the surface."""
+        return parameters.height - parameters.leg
 
     def longest_step(self) -> float:
         """Shorter than for the default gear as the fastest of springs, dampers and friction is faster than there."""
