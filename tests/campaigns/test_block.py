@@ -42,7 +42,7 @@ def rows_of(study: Study) -> Rows:
 
 
 AXES = [{"name": "loss", "values": [0.35, 0.6]}, {"name": "detection_delay", "values": [0.1, 0.5, 0.8, 1.5]}]
-SETTINGS = {"diagnosis.kind": "delayed", "sensors.kind": "ideal"}
+SETTINGS = {"diagnosis.kind": "delayed", "sensors.kind": "ideal", "ground": -1.0}
 LATE = study_of(AXES, **SETTINGS)
 
 
