@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rotorfault.autopilot.allocation.available import thrust_available
 from rotorfault.autopilot.control import CONTROLLER, ControlInputs
-from rotorfault.autopilot.control.cascade import AttitudeReference, Cascade, CascadeMemory, CascadeSettings
+from rotorfault.autopilot.control.attitude import AttitudeReference
+from rotorfault.autopilot.control.cascade import Cascade, CascadeMemory, CascadeSettings
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat

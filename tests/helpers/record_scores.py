@@ -86,7 +86,11 @@ def from_records(scenario: Scenario, signals: Mapping[str, Array], outcome: str)
     count = scenario.steps - half
     lasted = len(time) == scenario.steps
     found["late_position_rms"] = np.sqrt((error[late] ** 2).sum() / count) if lasted else np.nan
-    found["late_yaw_rms"] = np.sqrt((turn[late, 2] ** 2).sum() / count) if lasted else np.nan
+    forward = Rotation.from_quat(s["quaternion"], scalar_first=True).apply([1.0, 0.0, 0.0])
+    yaw = np.arctan2(forward[:, 1], forward[:, 0]) - s["yaw_reference"]
+    yaw = np.arctan2(np.sin(yaw), np.cos(yaw))
+    found["late_yaw_rms"] = np.sqrt((yaw[late] ** 2).sum() / count) if lasted else np.nan
+    found["yaw_error_end"] = yaw[-1]
     found["cost"] = cost(s, error, turn, air, dt)
     found |= detections(scenario, s, time, air)
     begun = [onset for onset in found["onset"] if np.isfinite(onset)]

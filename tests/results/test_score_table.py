@@ -104,7 +104,7 @@ def test_losses_are_named_and_dated() -> None:
     # A tilt beyond 90 degrees, also where roll and pitch both turn over and the thrust axis points up again.
     over = steps((40, [1.5, 1.5, 0.0]), (61, [1.6, 0.0, 0.0]))
     assert ending(attitude=over) == ("tumbled", pytest.approx(4.0))
-    assert ending(attitude=[math.pi, math.pi, 0.0])[0] == "settled"
+    assert ending(attitude=[math.pi, math.pi, 0.0], yaw_reference=math.pi)[0] == "settled"
     far = steps((20, [9e3, 0.0, 0.0]), (81, [1.1e4, 0.0, 0.0]))
     assert ending(position=far) == ("diverged", pytest.approx(2.0))
     # The first of several counts.

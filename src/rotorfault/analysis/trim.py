@@ -19,7 +19,7 @@ from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equati
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.autopilot.control import CONTROLLER
-from rotorfault.autopilot.control.cascade import attitude_for
+from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.errors import InputError

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from rotorfault.loop.scores import ERROR_FLOOR
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
-from rotorfault.maths.scalar import Scalar, absolute, less_equal, maximum, select
+from rotorfault.maths.scalar import Scalar, absolute, less_equal, maximum, select, wrap_angle
 
 Q_POSITION, Q_VELOCITY = 0.3, 0.005
 """Of (35): Q on the position error, over its magnitude, and on its rate."""
@@ -18,6 +18,11 @@ R_TORQUE, R_POSITION = 0.0088, (0.2, 0.2, 0.4)
 def attitude_error(attitude: Quat, yaw_reference: Scalar) -> Vec3:
     """Rotation vector in rad from the attitude that is level at the reference's yaw [rad] to an attitude."""
     return attitude.turned(-yaw_reference).rotation_vector()
+
+
+def heading_error(attitude: Quat, yaw_reference: Scalar) -> Scalar:
+    """Angle in rad from the reference's yaw [rad] to the heading of an attitude, the short way round."""
+    return wrap_angle(attitude.heading() - yaw_reference)
 
 
 def cost_rate(

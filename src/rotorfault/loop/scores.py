@@ -17,6 +17,9 @@ from rotorfault.maths.scalar import Scalar, maximum
 
 SETTLED = 0.02  # of the step: the two-percent criterion
 TRACKED = 0.05  # of the span; two and a half times the settling band, for a reference that moves: our choice
+# rad: with less a vehicle that is told to hold a heading does, whatever its way there; our choice, a fifth of what a
+# campaign grades as yaw given up.
+YAW_KEPT = 0.1
 ERROR_FLOOR = 0.01  # m, in the cost's Q and R, which the paper leaves infinite at e = 0 (docs/paper.md)
 FAR = 1e4  # m; beyond any scenario: what diverges
 SPEED_MAX = 1.0  # m/s, downwards at touch-down: as after a fall from 5 cm
@@ -94,6 +97,7 @@ class Scores(NamedTuple):
     last_away: Scalar  # number of the last step further than `RECOVERED` from the reference, -1 before any
     late_square: Vec3  # m^2: sum of squared errors over the last half
     late_yaw_square: Scalar  # rad^2: the same of yaw
+    yaw_error: Scalar  # rad, at the last instant
     position_square: Vec3  # m^2: sum of squared errors
     attitude_square: Vec3  # rad^2: the same of the attitude error
     position_error: Vec3  # m, at the last instant

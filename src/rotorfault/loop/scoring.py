@@ -4,6 +4,7 @@ Pure functions on scalars, so that every engine counts alike, a batch of a hundr
 and a flight has one set of numbers whatever of it is recorded and how finely.
 
 - *Outcome*: ``diverged`` (a number of the true state is not finite, or it is further than 10 km away), ``tumbled``
+<<<<<<< HEAD
   (tilt beyond 90 degrees) or ``ground`` (crash: touched the ground faster than 1 m/s down or 0.5 m/s sideways, or
   tilted beyond 15 degrees, or sank into it by the length of its legs) end a flight; so does ``landed`` (touched it
   more gently than that in a landing, and stood there with rotors stopped for 0.5 s). It touches where the ground
@@ -11,11 +12,21 @@ and a flight has one set of numbers whatever of it is recorded and how finely.
   ``settled`` (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square
   error over the last half within 5 % of the reference's span on every axis) or ``offset`` (neither). It has
   *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is ``interrupted``.
+=======
+  (tilt beyond 90 degrees) or ``ground`` (crash: below the ground without a landing under way, or touched it during a
+  landing faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees) end a flight; so does ``landed``
+  (touched it more gently than that, and stood there with rotors stopped for 0.5 s). A flight that lasts to its end is
+  ``settled`` (constant reference, within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference
+  that moves or turns, root mean square errors over the last half within 5 % of the reference's span on every axis
+  and 0.1 rad of yaw) or ``offset`` (neither). It has *survived* unless it diverged, tumbled or crashed. A flight that
+  somebody ended before is ``interrupted``.
+>>>>>>> 51a388e (Track attitude on SO(3), feed the yaw rate forward, and let outcomes see yaw)
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
 - *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.
 - *Attitude error*: rotation vector from the attitude that is level at the reference's yaw to the true one, in rad
   about body x, y, z; to first order these are roll, pitch and yaw error, and there is no angle at which it fails.
+- *Yaw error*: angle from the reference's yaw to where the body x axis points, seen from above, the short way round.
 - *Cost*: J = 1/2 int (e'Qe + u'Ru) dt with the printed weights (35), \|e\| floored at 0.01 m in both, e against the
   reference, u the torque given [N m] and the commanded acceleration less gravity and feed-forward [m/s^2], after
   limits. The same for every law and preset; a controller that does not record ``virtual_position`` has none.
@@ -34,7 +45,7 @@ from __future__ import annotations
 import math
 from typing import Any, final
 
-from rotorfault.loop.cost import attitude_error, cost_rate, each
+from rotorfault.loop.cost import attitude_error, cost_rate, each, heading_error
 from rotorfault.loop.scores import (
     COST_INPUT,
     FAR,
@@ -104,7 +115,8 @@ class Scoring:
         landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0) if self.lands else ()
         return Scores(
             over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,
-            position_square=none, attitude_square=none, position_error=none, attitude=Quat.identity(), velocity=none,
+            yaw_error=0.0, position_square=none, attitude_square=none, position_error=none,
+            attitude=Quat.identity(), velocity=none,
             cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, lowest_after=FAR, variation=0.0,
             command=PerRotor.all(0.0), saturated=0.0, given_up=none, flags=PerRotor.all(0.0), false_alarms=0.0,
             touched=0.0, gentle=1.0, rest=0.0,
@@ -179,7 +191,12 @@ class Scoring:
         if self.ground:
             # The end is told of all instants, also of those on the ground.
             error = signals.position - signals.position_reference
-            ending = after._replace(position_error=error, attitude=signals.quaternion, velocity=signals.velocity)
+            ending = after._replace(
+                position_error=error,
+                yaw_error=heading_error(signals.quaternion, signals.yaw_reference),
+                attitude=signals.quaternion,
+                velocity=signals.velocity,
+            )
             if self.lands:
                 ending = ending._replace(landing=self._land(scores, signals, parameters, begun, time))
             after = select_record(counted, ending, after)
@@ -221,6 +238,7 @@ class Scoring:
         error = signals.position - signals.position_reference
         square = error.times(error)
         turn = attitude_error(signals.quaternion, signals.yaw_reference)
+        yaw = heading_error(signals.quaternion, signals.yaw_reference)
         late = greater_equal(step, parameters.half)
         first = less(step, 0.5)
         command = signals.thrust_command
@@ -243,7 +261,8 @@ class Scoring:
             ),
             last_away=select(_inside(error, RECOVERED), scores.last_away, step),
             late_square=each(lambda old, e: select(late, old + e, old), scores.late_square, square),
-            late_yaw_square=select(late, scores.late_yaw_square + turn.z * turn.z, scores.late_yaw_square),
+            late_yaw_square=select(late, scores.late_yaw_square + yaw * yaw, scores.late_yaw_square),
+            yaw_error=yaw,
             position_square=scores.position_square + square,
             attitude_square=scores.attitude_square + turn.times(turn),
             position_error=error,

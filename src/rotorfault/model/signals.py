@@ -66,6 +66,11 @@ class Estimate(NamedTuple):
     specific_force_B: Vec3 = zeros()  # m/s^2: acceleration less gravity
     wind_W: Vec3 | Absent = ()  # m/s, of the air over ground, where the estimator knows it
 
+    @property
+    def attitude(self) -> Vec3:
+        """Roll, pitch, yaw in rad, for people and their first controllers; singular at a pitch of 90 degrees."""
+        return self.q_WB.euler()
+
 
 class Motion(NamedTuple):
     """What predictions need of an estimate; kept from one sampling instant to the next."""

@@ -11,7 +11,7 @@ angle or rotor:
   ``tilt_end``
   [rad];
 - ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
-  flights that lasted); ``cost``;
+  flights that lasted); ``yaw_error_end`` [rad]; ``cost``;
 - ``lowest`` [m], the least height, and ``lowest_after_loss`` [m], the same from the first onset of a fault on;
 - ``control_total_variation`` [N], ``saturated_fraction``, ``given_up_fraction`` by what was cut;
 - ``onset.R`` and ``detected.R`` [s], when the first fault of rotor R begins and when its flag rose from then on;
@@ -29,11 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Batch, columns
-from rotorfault.loop.closed_loop import LoopState
-from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, Scores, ScoringParameters
+from rotorfault.loop.closed_loop import LoopState, no_reference
+from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, YAW_KEPT, Scores, ScoringParameters
 from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.arrays import ANGLES, AXES, Array
-from rotorfault.maths.records import unflatten
+from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.telemetry import Signal
 
 GIVEN_UP = ("tilt", "thrust", "yaw")
@@ -121,6 +121,7 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table |= _named("position_error_end", AXES, scores.position_error)
         table |= _named("attitude_end", ANGLES, scores.attitude.euler())
         table["tilt_end"] = np.arccos(np.clip(scores.attitude.z_axis().z, -1.0, 1.0))
+        table["yaw_error_end"] = scores.yaw_error
         table |= _named("velocity_end", AXES, scores.velocity)
         late = np.maximum(batch.steps - parameters.half, 1.0)
         table["late_position_rms"] = np.where(lasted, np.sqrt(scores.late_square.sum() / late), np.nan)
@@ -152,15 +153,18 @@ def score_name(signal: Signal) -> str:
 
 def _outcomes(batch: Batch, scores: Scores, parameters: ScoringParameters) -> NDArray[Any]:
     """How each flight ended."""
-    constant = bool((np.ptp(batch.reference[:, :3], axis=0) == 0.0).all())
+    wanted = unflatten(no_reference(), list(batch.reference.T[: len(flatten(no_reference()))]))
+    constant = all(np.ptp(column) == 0.0 for column in (*wanted.p_W, wanted.yaw))
     if constant:
         good = [np.abs(e) <= b for e, b in zip(scores.position_error, parameters.settle_band, strict=True)]
+        good.append(np.abs(scores.yaw_error) <= YAW_KEPT)
     else:
         late = batch.steps - parameters.half
         good = [
             np.sqrt(square / late) <= band
             for square, band in zip(scores.late_square, parameters.track_band, strict=True)
         ]
+        good.append(np.sqrt(scores.late_yaw_square / late) <= YAW_KEPT)
     flown = np.where(np.logical_and.reduce(good), "settled" if constant else "tracked", "offset")
     flown = np.where(scores.rest > 0.0, "landed", flown)
     return np.where(scores.over > 0.0, np.array(ENDS)[scores.over.astype(int)], flown)

@@ -8,7 +8,7 @@ from typing import Any
 
 from rotorfault.base.errors import InputError
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.part import change_preset
+from rotorfault.scenario.part import change_kind, change_preset
 from rotorfault.scenario.slots import SLOTS
 
 
@@ -28,8 +28,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
     Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
     below it is set (``vehicle.rotor_bandwidth.value``). Setting ``kind``, or a table that has one to a bare name,
-    drops the other settings of that table: they belonged to another kind. Setting ``preset`` drops those that the
-    former preset gave (`rotorfault.scenario.part.change_preset`).
+    drops the other settings of that table: they belonged to another kind (`rotorfault.scenario.part.change_kind`).
+    Setting ``preset`` drops those that the former preset gave (`rotorfault.scenario.part.change_preset`).
 
     Raises
     ------
@@ -60,8 +60,11 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
     elif not isinstance(here, dict):
         raise InputError(f"{key}: '{'.'.join(path)}' is a single value; it has no key '{last}'")
     elif last == "kind" and here.get("kind") != value:
-        here.clear()
-        here["kind"] = value
+        if len(path) == 1 and path[0] in SLOTS:
+            change_kind(SLOTS[path[0]], here, value)
+        else:
+            here.clear()
+            here["kind"] = value
     elif last == "preset" and path and path[0] in SLOTS:
         change_preset(SLOTS[path[0]], here, value)
     else:

@@ -137,6 +137,36 @@ def read(slot: Slot[B], value: Any, allow: bool | Collection[str] = False) -> Pa
         raise refusal("", str(error)) from None
 
 
+def change_kind(slot: Slot[Any], table: dict[str, Any], kind: Any) -> None:
+    """Put another kind into the table of a part, in place.
+
+    The settings belonged to the former kind and go, but for groups of settings that both kinds have, such as those of
+    the cascade around a control law, as far as no preset gave them.
+
+    Parameters
+    ----------
+    slot : Slot
+    table : dict
+    kind : str
+        Name of the new one.
+    """
+    former = table.get("kind", slot.default)
+    own = _beside_preset(slot, table)
+    table.clear()
+    table["kind"] = kind
+    known = slot.registry
+    if isinstance(former, str) and isinstance(kind, str) and former in known and kind in known:
+        groups = [
+            {
+                name: field.annotation
+                for name, field in known[one].Settings.model_fields.items()
+                if isinstance(field.annotation, type) and issubclass(field.annotation, Strict)
+            }
+            for one in (former, kind)
+        ]
+        table |= {key: own[key] for key in own if groups[0].get(key, 0) is groups[1].get(key, 1)}
+
+
 def change_preset(slot: Slot[Any], table: dict[str, Any], preset: str) -> None:
     """Put another preset into the table of a part, in place.
 
@@ -150,19 +180,25 @@ def change_preset(slot: Slot[Any], table: dict[str, Any], preset: str) -> None:
     preset : str
         Name of the new one.
     """
-    former, kind = table.get("preset"), str(table.get("kind", slot.default))
-    table["preset"] = preset
-    if former in (None, preset) or slot.presets is None or kind not in slot.registry:
-        return
-    try:
-        settings = slot.registry[kind].Settings.model_validate(slot.presets(kind).get(former, {}))
-    except ValidationError:
-        return  # of one that gives not all that is needed no table is full by itself
-    before = settings.model_dump(mode="json")
-    if set(table) >= set(before):
-        kept = _unlike({key: value for key, value in table.items() if key not in ("kind", "preset")}, before)
+    if table.get("preset") not in (None, preset):
+        kind, kept = table.get("kind", slot.default), _beside_preset(slot, table)
         table.clear()
-        table.update({"kind": kind, **kept, "preset": preset})
+        table.update({"kind": kind, **kept})
+    table["preset"] = preset
+
+
+def _beside_preset(slot: Slot[Any], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings in the table of a part that its preset did not give."""
+    kind, preset = str(table.get("kind", slot.default)), table.get("preset")
+    own = {key: value for key, value in table.items() if key not in ("kind", "preset")}
+    if preset is None or slot.presets is None or kind not in slot.registry:
+        return own
+    try:
+        settings = slot.registry[kind].Settings.model_validate(slot.presets(kind).get(preset, {}))
+    except ValidationError:
+        return own  # of one that gives not all that is needed no table is full by itself
+    before = settings.model_dump(mode="json")
+    return _unlike(own, before) if set(own) >= set(before) else own
 
 
 def _unlike(table: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:

@@ -24,13 +24,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from rotorfault.autopilot.control.cascade import (
-    AttitudeReference,
-    CascadeSettings,
-    attitude_for,
-    filtered,
-    limited_force,
-)
+from rotorfault.autopilot.control.attitude import AttitudeReference, attitude_for, filtered
+from rotorfault.autopilot.control.cascade import CascadeSettings, limited_force
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import no_watch
 from rotorfault.flight.assembly import assemble, assemble_all
@@ -98,9 +93,11 @@ def test_command_filter_starts_at_the_measured_attitude(name: str) -> None:
     attitude = Vec3(0.6, -0.5, 2.0)
     seen = estimate(zeros(), zeros(), attitude, Vec3(0.3, 0.2, 0.1))
     wanted = Reference(Vec3(1.0, 1.0, 1.0), zeros(), zeros(), 0.0, 0.0, 0.0)
-    first = controller_step(cascade(name), VEHICLE, seen, wanted)
-    assert first.before.reference == AttitudeReference(attitude, zeros())
-    assert first.telemetry.attitude_command == attitude
+    by_angles = controller_step(cascade(name, tracking="euler"), VEHICLE, seen, wanted)
+    assert by_angles.before.reference == AttitudeReference(attitude, zeros())
+    for tracking in ("euler", "so3"):
+        first = controller_step(cascade(name, tracking=tracking), VEHICLE, seen, wanted)
+        np.testing.assert_allclose(arr(first.telemetry.attitude_command), arr(attitude), atol=1e-12)
     level = controller_step(cascade(name, six_inputs=True), VEHICLE, seen, wanted)
     assert level.before.reference == AttitudeReference(zeros(), zeros())
 

@@ -12,10 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag, solve_continuous_are
 
-from rotorfault.autopilot.control.cascade import (
-    AttitudeReference,
-    filtered,
-)
+from rotorfault.autopilot.control.attitude import AttitudeReference, filtered
 from rotorfault.autopilot.control.ismc import HurwitzGain, Ismc
 from rotorfault.autopilot.control.protocol import TrackingError
 from rotorfault.autopilot.control.riccati import position_gain
@@ -81,7 +78,7 @@ def test_attitude_error_dynamics_are_those_designed_for(
     attitude: Vec3, omega: Vec3, held: Vec3, held_rate: Vec3, residual: float, p: Vec3
 ) -> None:
     """e'' = W e' + u for the true body under the torque that the cascade asks for, (34)."""
-    made = cascade("smc")
+    made = cascade("smc", tracking="euler")
     wanted = Reference(zeros(), zeros(), zeros(), 0.4, 0.0, 0.0)
     reference = AttitudeReference(held, held_rate)
     seen = estimate(p, zeros(), attitude, omega)

@@ -5,15 +5,14 @@ at zero (reference acceleration, gravity, believed drag),
 
 .. math:: f_W = a_{ref} + u_p + \tfrac{k_d}{m} v_W + g e_z,
 
-is a specific force, limited vertical part first, then by tilt and available thrust. At the measured yaw it asks for
+is a specific force, limited vertical part first, then by tilt and available thrust. It is the wanted thrust axis,
+with the thrust
 
-.. math:: \theta_d = \mathrm{atan2}(f_x', f_z), \quad \phi_d = \mathrm{atan2}(-f_y', \sqrt{f_x'^2 + f_z^2}), \quad
-          T = m f_z / \max(\cos\phi\cos\theta, c_{min})
+.. math:: T = m f_z / \max(\cos\phi\cos\theta, c_{min}).
 
-with f' = f turned into the heading frame. The demand passes a critically damped second-order command filter, exact
-for a held input and so stable at any sampling period; its rate and acceleration are the attitude reference's, and
-the attitude group turns the error into torque = J (u_a + d(omega_ref)/dt - W omega_ref). Euler rates are taken for
-body rates, as the paper does.
+Axis and heading pass a critically damped second-order command filter, exact for a held input and so stable at any
+sampling period; its rate and acceleration are the attitude reference's, and the attitude group turns the error into
+torque = J (u_a + d(omega_ref)/dt - W omega_ref). What error and rates are: `rotorfault.autopilot.control.attitude`.
 
 The unphysical option ``six_inputs`` is the paper's literal (34): accelerations on x and y act directly, the
 attitude reference is level, thrust and torques still pass through the rotors.
@@ -26,6 +25,7 @@ from typing import Annotated, Any, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, create_model
 
+from rotorfault.autopilot.control.attitude import TRACKINGS, AttitudeReference, Tracking, level_attitude
 from rotorfault.autopilot.control.protocol import (
     CONTROLLER,
     ControlInputs,
@@ -41,12 +41,12 @@ from rotorfault.autopilot.control.sdre import gyroscopic_drift
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, any_of, atan2, clip, exp, maximum, minimum, sqrt, wrap_angle
+from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
 from rotorfault.model.block import Context, Record
 from rotorfault.model.motion import drag_acceleration
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, wrench_of
 
 
 class CascadeSettings(Strict):
@@ -78,6 +78,10 @@ class CascadeSettings(Strict):
     horizontal_lag: float = Field(
         default=8.0, gt=0.0, description="bandwidth with which horizontal acceleration is believed to come [rad/s]"
     )
+    tracking: Tracking = Field(
+        default="so3",
+        description="so3: thrust axis and heading as rotations | euler: Euler rates taken for body rates, as in (3)",
+    )
     six_inputs: bool = Field(default=False, description="x and y accelerations act directly: unphysical, for study")
 
 
@@ -91,13 +95,6 @@ class CascadeParameters(NamedTuple):
     cos_min: Scalar
     filter_bandwidth: Scalar  # rad/s
     horizontal_lag: Scalar  # rad/s
-
-
-class AttitudeReference(NamedTuple):
-    """State of the command filter: what the attitude loop tracks."""
-
-    attitude: Vec3  # rad
-    rate: Vec3  # rad/s
 
 
 class CascadeMemory(NamedTuple):
@@ -118,32 +115,6 @@ def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: Ca
     horizontal = sqrt(f_W.x * f_W.x + f_W.y * f_W.y + 1e-18)
     scale = minimum(room / horizontal, 1.0)
     return Vec3(f_W.x * scale, f_W.y * scale, f_z)
-
-
-def attitude_for(f_W: Vec3, cos_yaw: Scalar, sin_yaw: Scalar, yaw_ref: Scalar) -> Vec3:
-    """Attitude in rad whose thrust axis points along f, roll and pitch taken at the present yaw."""
-    c, s = cos_yaw, sin_yaw
-    forward, left = c * f_W.x + s * f_W.y, c * f_W.y - s * f_W.x
-    return Vec3(
-        atan2(-left, sqrt(forward * forward + f_W.z * f_W.z)),
-        atan2(forward, f_W.z),
-        yaw_ref,
-    )
-
-
-def filtered(
-    reference: AttitudeReference, demand: Vec3, bandwidth: Scalar, dt: Scalar
-) -> tuple[AttitudeReference, Vec3]:
-    """One period of the critically damped command filter: (next state, acceleration now in rad/s^2)."""
-    gap = Vec3(
-        reference.attitude.x - demand.x, reference.attitude.y - demand.y, wrap_angle(reference.attitude.z - demand.z)
-    )
-    slope = reference.rate + gap * bandwidth
-    decay = exp(-bandwidth * dt)
-    after = (gap + slope * dt) * decay
-    rate = (reference.rate - slope * (bandwidth * dt)) * decay
-    acceleration = -(gap * (bandwidth * bandwidth)) - reference.rate * (2.0 * bandwidth)
-    return AttitudeReference(reference.attitude + after - gap, rate), acceleration
 
 
 class CascadeSignals(NamedTuple):
@@ -173,6 +144,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def __init__(self, law: Law[Any], settings: CascadeSettings, telemetry: type[Record]) -> None:
         self.law = law
         self.settings = settings
+        self.tracking = TRACKINGS[settings.tracking]
         self._record: Any = telemetry
         self.Telemetry = telemetry  # type: ignore[misc]  # of the law's kind
 
@@ -192,12 +164,12 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
         """Memory before the first step; the command filter starts at the estimated attitude."""
         estimate, level = inputs.estimate, zeros()
-        angles = estimate.q_WB.euler()
-        start = AttitudeReference(level if self.settings.six_inputs else angles, level)
+        at = self.tracking.start(estimate.q_WB)
+        start = level_attitude() if self.settings.six_inputs else at
         nothing = Prediction(level, level)
-        still = Mat3.diagonal(level)
         position = _position_error(estimate, inputs.reference, nothing, level)
-        attitude = _attitude_error(angles, estimate.omega_B, start, level, nothing, still, level)
+        # Only its rate matters: surfaces begin there.
+        attitude = _attitude_error(level, estimate.omega_B, level, level, nothing, Mat3.diagonal(level), level)
         law = self.law.initial(position, attitude, parameters.law)
         return CascadeMemory(law.position, law.attitude, start)
 
@@ -208,7 +180,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         estimate, reference, vehicle = inputs.estimate, inputs.reference, inputs.vehicle
         six_inputs = self.settings.six_inputs
         w0 = vehicle.rotor_bandwidth
-        angles, R_WB = estimate.q_WB.euler(), estimate.q_WB.matrix()
+        R_WB = estimate.q_WB.matrix()
 
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
@@ -218,35 +190,39 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
         force_W = limited_force(wanted, inputs.thrust_available, vehicle, parameters)
 
-        # Attitude demand and its filter.
+        # Thrust axis and heading, and how far the body is from them.
         if six_inputs:
-            demand, direct = Vec3(0.0, 0.0, reference.yaw), Vec3(wanted.x, wanted.y, 0.0)
+            axis_W, direct = Vec3(0.0, 0.0, 1.0), Vec3(wanted.x, wanted.y, 0.0)
             given = Vec3(outer.u.x, outer.u.y, force_W.z - wanted.z + outer.u.z)
         else:
-            # Of a body axis that points straight up there is no heading; the floor keeps it a number.
-            level = 1.0 / maximum(sqrt(R_WB.xx * R_WB.xx + R_WB.yx * R_WB.yx), 1e-15)
-            demand, direct = attitude_for(force_W, R_WB.xx * level, R_WB.yx * level, reference.yaw), zeros()
+            axis_W, direct = force_W, zeros()
             given = outer.u + force_W - wanted
-        following, acceleration = filtered(memory.reference, demand, parameters.filter_bandwidth, dt)
+        turn = self.tracking.track(
+            memory.reference, estimate, R_WB, axis_W, reference, parameters.filter_bandwidth, dt
+        )
 
         # Attitude loop: torque.
-        drift = gyroscopic_drift(vehicle, estimate.omega_B, inputs.residual_speed)
         attitude = _attitude_error(
-            angles,
+            turn.e,
             estimate.omega_B,
-            memory.reference,
-            acceleration,
+            turn.rate,
+            turn.acceleration,
             inputs.prediction,
-            drift,
+            gyroscopic_drift(vehicle, estimate.omega_B, inputs.residual_speed),
             Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
-        torque_B = (inner.u + attitude.feed_forward).times(vehicle.inertia)
+        torque_B = self.tracking.ahead_of_lag(
+            (inner.u + attitude.feed_forward).times(vehicle.inertia),
+            wrench_of(vehicle, inputs.expected_thrust * (1.0 - inputs.diagnosis.loss)).torque_B,
+            estimate.omega_B,
+            w0,
+        )
 
         thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
         own = CascadeSignals(
-            attitude_demand=demand,
-            attitude_command=memory.reference.attitude,
+            attitude_demand=turn.demand,
+            attitude_command=turn.command,
             virtual_position=given,
             virtual_attitude=inner.u,
             gain_position=outer.gain_e.diag,
@@ -256,7 +232,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         )
         output = ControlOutput(Wrench(thrust, torque_B), direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
-        return CascadeMemory(position_memory, attitude_memory, following), output, self._record(*own, *recorded)
+        return CascadeMemory(position_memory, attitude_memory, turn.after), output, self._record(*own, *recorded)
 
 
 def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:
@@ -290,21 +266,20 @@ def _position_error(
 
 
 def _attitude_error(
-    angles: Vec3,
+    e: Vec3,
     omega_B: Vec3,
-    reference: AttitudeReference,
+    rate: Vec3,
     acceleration: Vec3,
     prediction: Prediction,
     drift: Mat3,
     actuator: Vec3,
 ) -> TrackingError:
-    gap = angles - reference.attitude
     return TrackingError(
-        e=Vec3(gap.x, gap.y, wrap_angle(gap.z)),
-        e_dot=omega_B - reference.rate,
+        e=e,
+        e_dot=omega_B - rate,
         rate=omega_B,
         predicted=prediction.delta_omega_B,
-        feed_forward=acceleration - drift @ reference.rate,
+        feed_forward=acceleration - drift @ rate,
         drift=drift,
         actuator=actuator,
     )
