@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from rotorfault.plant.sensors import SensorInputs, Sensors
     from rotorfault.plant.timed import TimeInputs
     from rotorfault.plant.wind import Air, Wind
-    from rotorfault.reference.sources import ReferenceSource, ReferenceTable
+    from rotorfault.reference.protocol import ReferenceSource, ReferenceTable
     from rotorfault.scenario.library import load_scenario, scenario_names
     from rotorfault.scenario.neighbours import neighbour
     from rotorfault.scenario.scenario import Scenario
@@ -86,8 +86,8 @@ _HOME = {
     "Reading": "model.signals",
     "Readings": "model.signals",
     "Reference": "model.signals",
-    "ReferenceSource": "reference.sources",
-    "ReferenceTable": "reference.sources",
+    "ReferenceSource": "reference.protocol",
+    "ReferenceTable": "reference.protocol",
     "Response": "autopilot.response.protocol",
     "ResponseInputs": "autopilot.response.protocol",
     "Scenario": "scenario.scenario",

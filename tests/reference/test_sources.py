@@ -16,8 +16,7 @@ from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Vec3
 from rotorfault.model.signals import Reference
-from rotorfault.reference import REFERENCE
-from rotorfault.reference.sources import ReferenceTable
+from rotorfault.reference import REFERENCE, ReferenceTable
 
 Array = NDArray[np.float64]
 H = 1e-4  # s, step of the finite differences here

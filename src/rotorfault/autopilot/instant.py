@@ -11,6 +11,8 @@ from typing import Any, NamedTuple, cast, final
 
 from rotorfault.autopilot.prediction import Expectation, Prediction, predict
 from rotorfault.autopilot.rotor_model import RotorModel, expected_thrust
+from rotorfault.base.errors import InputError
+from rotorfault.base.number_rule import short
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.signals import (
@@ -25,6 +27,12 @@ from rotorfault.model.signals import (
     motion_of,
 )
 from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
+
+DEMANDS = (
+    "Wrench(thrust, Vec3(roll, pitch, yaw)) in N and N m, or PerRotor(r1, r2, r3, r4) of thrusts in N, which are "
+    "thrust_coefficient times the squared rotor speeds"
+)
+"""What a controller may ask for, for messages."""
 
 
 class Past(NamedTuple):
@@ -88,8 +96,18 @@ class Instant:
 
     @property
     def demand(self) -> Wrench | PerRotor:
-        """What the controller asks for: a wrench, or commands of the rotors in N."""
-        return cast("Wrench | PerRotor", self.outputs["controller"].demand)
+        """What the controller asks for: a wrench, or commands of the rotors in N.
+
+        Raises
+        ------
+        InputError
+            If it is neither: four numbers alone may be anything.
+        """
+        output = self.outputs["controller"]
+        demand: object = getattr(output, "demand", None)
+        if not isinstance(demand, (Wrench, PerRotor)):
+            raise InputError(f"the controller's step gives {short(output)}; allowed: a ControlOutput with {DEMANDS}")
+        return demand
 
     @property
     def allocation(self) -> Allocation:

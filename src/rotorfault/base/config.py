@@ -21,6 +21,9 @@ from rotorfault.base.number_rule import refusal as refusal
 
 M = TypeVar("M", bound=BaseModel)
 
+LONGEST_TEXT = 64_000_000
+"""Bytes of a text file: a table of a million rows with all columns has about as many."""
+
 Three = tuple[float, float, float]
 """Three numbers, one per axis."""
 
@@ -169,10 +172,19 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def read_text(path: str | Path) -> str:
-    """Read a UTF-8 text file; raises InputError in one line if it is missing, unreadable or not UTF-8."""
+    """Read a UTF-8 text file; raises InputError in one line if it is missing, unreadable, too long or not UTF-8."""
     path = Path(path)
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r}: is no path; leave out the NUL character")
     try:
-        return path.read_bytes().decode("utf-8")
+        # A pipe would wait for ever, a device never end.
+        if not (path.is_file() or path.is_dir()) and path.exists():
+            raise InputError(f"{path}: is a pipe, socket or device; give a regular file")
+        with path.open("rb") as file:
+            content = file.read(LONGEST_TEXT + 1)
+        if len(content) > LONGEST_TEXT:
+            raise InputError(f"{path}: is longer than {LONGEST_TEXT / 1e6:.0f} MB, the most that is read; shorten it")
+        return content.decode("utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except IsADirectoryError:

@@ -5,12 +5,13 @@ Any dotted key of the scenario is an axis too (``controller.law.weights.error_fl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base.angles import TURN, in_radians
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.plant.sensors import Noisy
 
@@ -69,7 +70,7 @@ AXES: dict[str, Axis] = {
     "second_loss": Axis("1", "loss of the second fault", _key("second_loss", "fault.1.loss"), (0.0, 1.0)),
     "second_onset": Axis("s", "time of the second fault", _key("second_onset", "fault.1.time"), (0.0, np.inf)),
     "wind_speed": Axis("m/s", "speed of the mean wind, over ground", _wind, (0.0, 100.0)),
-    "wind_direction": Axis("rad", "where it blows to, from x towards y", _wind),
+    "wind_direction": Axis("rad", "where it blows to, from x towards y", _wind, (-TURN, TURN)),
     "gust_intensity": Axis(
         "m/s", "wind at 6 m that gusts go with (wind dryden)", _key("gust_intensity", "wind.wind_at_6m"), (0.0, 100.0)
     ),
@@ -118,6 +119,26 @@ def axis(name: str) -> Axis:
     if "." in name:
         return Axis("", f"key {name} of the scenario", _key(name, name))
     raise InputError(f"{unknown('axis', name, list(AXES))}; or give a dotted key of the scenario")
+
+
+def out_of_range(name: str, values: Iterable[Any]) -> str | None:
+    """The first number that an axis cannot have, in words; None if it can have all.
+
+    Parameters
+    ----------
+    name : str
+        Of the axis, or a dotted key.
+    values : iterable
+        Numbers or texts.
+    """
+    (low, high), unit = axis(name).range, axis(name).unit
+    for value in values:
+        if not isinstance(value, str) and not low <= value <= high:
+            came = in_radians(value) if unit == "rad" else f"{value:g}"
+            return f"{name} = {came}; allowed: {low:g} to {high:g}"
+        if isinstance(value, str) and name in AXES and (low, high) != (-np.inf, np.inf):
+            return f"{name} = '{value}', a text; allowed: numbers from {low:g} to {high:g}"
+    return None
 
 
 def columns(values: Mapping[str, NDArray[Any]]) -> Columns:

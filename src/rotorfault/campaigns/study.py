@@ -21,7 +21,8 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
-from rotorfault.campaigns.axes import axis
+from rotorfault.base.number_rule import short
+from rotorfault.campaigns.axes import axis, out_of_range
 from rotorfault.campaigns.grades import GRADES, SUCCESS
 from rotorfault.campaigns.sampling.refine import Refinement
 from rotorfault.campaigns.studies import FOLDER, study_names
@@ -58,10 +59,10 @@ class GridAxis(Strict):
             raise refusal("values", "is missing; give values, or start, stop and count")
         elif not self.start < self.stop:
             raise refusal("stop", f"got {self.stop:g}, an empty range; allowed: above start = {self.start:g}")
-        low, high = axis(self.name).range
-        wrong = [v for v in self.grid if isinstance(v, float) and not low <= v <= high]
-        if wrong:
-            raise refusal("values", f"{self.name} = {wrong[0]:g}; allowed: {low:g} to {high:g}")
+        if len({isinstance(value, str) for value in self.grid}) > 1:
+            raise refusal("values", f"has numbers and texts: {short(list(self.grid))}; allowed: one or the other")
+        if wrong := out_of_range(self.name, self.grid):
+            raise refusal("values", wrong)
         return self
 
     @property
@@ -94,10 +95,12 @@ class Draw(Strict):
             raise refusal("normal", f"got {list(self.normal)}; allowed: [mean, deviation above 0]")
         if self.choice is not None and not self.choice:
             raise refusal("choice", "is empty; give at least one value")
-        low, high = axis(self.name).range
-        for value in (*(self.uniform or ()), *(self.choice or ())):
-            if isinstance(value, float) and not low <= value <= high:
-                raise refusal("", f"{self.name} = {value:g}; allowed: {low:g} to {high:g}")
+        if len({isinstance(value, str) for value in self.choice or ()}) > 1:
+            raise refusal(
+                "choice", f"has numbers and texts: {short(list(self.choice or ()))}; allowed: one or the other"
+            )
+        if wrong := out_of_range(self.name, (*(self.uniform or ()), *(self.choice or ()))):
+            raise refusal("", wrong)
         return self
 
 

@@ -18,6 +18,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.engine.batch import Batch
 from rotorfault.engine.program import same_code
 from rotorfault.flight.beginning import initial_state, start_of
+from rotorfault.flight.reference_rows import reference_of, require_above_ground
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.arrays import Array
@@ -210,39 +211,6 @@ def source_of(scenario: Scenario, own: Own) -> ReferenceSource:
     return mine if isinstance(mine, ReferenceSource) else scenario[REFERENCE].make()
 
 
-def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> Array:
-    """Rows of `Reference` and of the source's own signals, one for each sampling instant.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    source : ReferenceSource, optional
-        In place of the scenario's.
-
-    Returns
-    -------
-    ndarray, shape (steps, 12 and own)
-
-    Raises
-    ------
-    InputError
-        If one is not finite.
-    """
-    source = scenario[REFERENCE].make() if source is None else source
-    times: Array = np.arange(scenario.steps, dtype=np.float64) * scenario.period
-    with np.errstate(all="ignore"):
-        table = source.table(times)
-        own = [np.broadcast_to(leaf, times.shape) for leaf in flatten(source.signals(times))]
-        rows = np.column_stack([*table, *own])
-    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(wrong):
-        raise InputError(
-            f"reference: position, velocity or acceleration at t = {times[wrong[0]]:g} s is not finite; "
-            "its numbers are too large, or its times too short"
-        )
-    return rows
-
-
 @final
 class _Assembly:
     """Builds the batch of some flights of a group.
@@ -285,6 +253,9 @@ class _Assembly:
         start = self.numbers(("start",), lambda s: start_of(scenario.model_copy(update={"start": s})))
         position = np.stack([np.broadcast_to(x, (self.count,)) for x in start.p_W], axis=-1)
         ground = loop.maybe(GROUND)
+        if ground is not None:
+            heights = ground.height(parameters.parts.ground)
+            require_above_ground(source, reference, scenario.period, position[:, 2], heights)
         scoring = scoring_parameters(
             position if self.count > 1 else position[0],
             believed.thrust_min,

@@ -16,8 +16,9 @@ from rotorfault.base.foreign import in_one_line
 from rotorfault.engine import have_simd, load_engine
 from rotorfault.engine.batch import Batch, Recording, columns, drive_rows, drive_template, no_watch
 from rotorfault.engine.program import same_trace, trace
-from rotorfault.flight.assembly import assemble, reference_of
+from rotorfault.flight.assembly import assemble
 from rotorfault.flight.beginning import begins_alike, initial_state, start_of
+from rotorfault.flight.reference_rows import reference_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.model.telemetry import example, signals_of

@@ -7,10 +7,11 @@ same alone and in a batch and on every engine.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple, final
+from typing import Annotated, ClassVar, NamedTuple, final
 
 from pydantic import Field
 
+from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, radians
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
@@ -89,10 +90,12 @@ class Noisy(Sensors[NoisyMemory, NoisyParameters]):
 
         position: float = Field(0.005, ge=0.0, description="standard deviation of position [m]")
         velocity: float = Field(0.01, ge=0.0, description="standard deviation of velocity [m/s]")
-        attitude: float = Field(
+        attitude: Annotated[float, radians(HALF_TURN)] = Field(
             0.002, ge=0.0, description="standard deviation of small rotations about each body axis [rad]"
         )
-        rate: float = Field(0.005, ge=0.0, description="standard deviation of the rates [rad/s]")
+        rate: Annotated[float, radians(FASTEST_TURN, "rad/s")] = Field(
+            0.005, ge=0.0, description="standard deviation of the rates [rad/s]"
+        )
         delay: int = Field(0, ge=0, le=100, description="sampling periods by which measurements come late")
 
     def parameters(self, context: Context) -> NoisyParameters:

@@ -3,6 +3,19 @@
 Importing the package registers every reference, so that the registry is complete.
 """
 
-from rotorfault.reference.sources import REFERENCE, ReferenceSource, ReferenceTable
+from rotorfault.reference.protocol import REFERENCE, ReferenceSource, ReferenceTable
+from rotorfault.reference.sources import Csv, SetPoint, Sinusoid, Square, Waypoints
 
-__all__ = ["REFERENCE", "ReferenceSource", "ReferenceTable"]
+from rotorfault.reference.function import Function  # isort: skip  # registered, and so listed, last
+
+__all__ = [
+    "REFERENCE",
+    "Csv",
+    "Function",
+    "ReferenceSource",
+    "ReferenceTable",
+    "SetPoint",
+    "Sinusoid",
+    "Square",
+    "Waypoints",
+]

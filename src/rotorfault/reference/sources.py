@@ -9,83 +9,32 @@ acceleration are the exact derivatives of the position that is tabulated:
   paper (section 5.3). At a switch the velocity jumps by 2 A / T; acceleration is that between the switches.
 - ``waypoints``: rest to rest by the minimum-jerk polynomial 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985).
 - ``csv``: a table, interpolated by polynomials that go through all that it gives.
-- ``function``: a Python function; central differences where it gives no derivatives.
+
+The reference along a Python function is in `rotorfault.reference.function`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Annotated, Any, NamedTuple, TypeAlias, cast, final
+from typing import Annotated, Any, TypeAlias, final
 
 import numpy as np
-from pydantic import Field, field_serializer, model_validator
+from pydantic import Field, model_validator
 
-from rotorfault.base import foreign
+from rotorfault.base.angles import TURN, radians
 from rotorfault.base.config import Strict, read_text, refusal
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import Vec3
-from rotorfault.maths.records import flatten
-from rotorfault.model.block import Block, Nothing, Record
-from rotorfault.model.signals import Reference
-from rotorfault.model.slot import Slot, register
+from rotorfault.model.slot import register
 from rotorfault.reference.csv_table import read_table
+from rotorfault.reference.protocol import ReferenceSource, ReferenceTable, stacked
+from rotorfault.reference.turns import continuous_yaw
 
+Heading: TypeAlias = Annotated[float, radians(TURN)]
 Triple: TypeAlias = tuple[float, float, float]
 PositiveTriple: TypeAlias = tuple[
     Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]
 ]
-
-STEP = 3e-4  # s, of central differences: truncation and rounding of the second one are then both about 1e-8
-
-
-class ReferenceTable(NamedTuple):
-    """A reference at n instants."""
-
-    p_W: Array  # (n, 3) m
-    v_W: Array  # (n, 3) m/s
-    a_W: Array  # (n, 3) m/s^2
-    yaw: Array  # (n,) rad
-    yaw_rate: Array  # (n,) rad/s
-    yaw_acceleration: Array  # (n,) rad/s^2
-
-    def at(self, rows: Any) -> Reference:
-        """The reference at one row, as scalars, or at several, as arrays."""
-        p, v, a = (Vec3(*columns[rows].T) for columns in (self.p_W, self.v_W, self.a_W))
-        return Reference(p, v, a, self.yaw[rows], self.yaw_rate[rows], self.yaw_acceleration[rows])
-
-
-class ReferenceSource(Block[Nothing, ReferenceTable, Nothing, Nothing]):
-    """Where the vehicle should be, as a function of time: tabulated before the flight, not stepped in it."""
-
-    def table(self, times: Array) -> ReferenceTable:
-        """The reference at the given instants.
-
-        Parameters
-        ----------
-        times : ndarray, shape (n,)
-            In s from the start of the flight, 0 or greater.
-        """
-        raise NotImplementedError(f"{type(self).__name__} has no table")
-
-    def signals(self, times: Array) -> Record:
-        """What it records of itself: an instance of `Telemetry` with arrays of shape (n,) as numbers.
-
-        Parameters
-        ----------
-        times : ndarray, shape (n,)
-            In s from the start of the flight.
-        """
-        return Nothing()
-
-
-REFERENCE = Slot("reference", ReferenceSource, "task", "where the vehicle should be", "references")
-
-
-def _table(four: Array, rate: Array, acceleration: Array) -> ReferenceTable:
-    """Table of arrays (n, 4) with the columns x, y, z, yaw and their derivatives."""
-    return ReferenceTable(four[:, :3], rate[:, :3], acceleration[:, :3], four[:, 3], rate[:, 3], acceleration[:, 3])
 
 
 @register("set_point")
@@ -97,13 +46,13 @@ class SetPoint(ReferenceSource):
         """Where."""
 
         position: Triple = Field(description="x, y, z in the world frame [m]")
-        yaw: float = Field(default=0.0, description="Yaw angle [rad]")
+        yaw: Heading = Field(default=0.0, description="Yaw angle [rad]")
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
         four = np.tile([*self.settings.position, self.settings.yaw], (len(times), 1))
         nothing = np.zeros_like(four)
-        return _table(four, nothing, nothing)
+        return stacked(four, nothing, nothing)
 
 
 class Waypoint(Strict):
@@ -135,6 +84,11 @@ class Waypoints(ReferenceSource):
                     raise refusal(f"points.{number}.time", f"got {here!r} s; allowed: {allowed}")
             return self
 
+    def span(self) -> tuple[float, float] | None:
+        """From the first to the last point; one point alone is held for ever."""
+        points = self.settings.points
+        return (points[0].time, points[-1].time) if len(points) > 1 else None
+
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
         points = self.settings.points
@@ -146,7 +100,7 @@ class Waypoints(ReferenceSource):
         duration = np.diff(knots)[leg][:, None]
         way = np.diff(values, axis=0)[leg]
         s = np.clip((times[:, None] - knots[leg][:, None]) / duration, 0.0, 1.0)
-        return _table(
+        return stacked(
             values[leg] + way * (s * s * s * (10.0 - s * (15.0 - 6.0 * s))),
             way * (30.0 * s * s * (1.0 - s) * (1.0 - s)) / duration,
             way * (60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)) / (duration * duration),
@@ -163,16 +117,18 @@ class Sinusoid(ReferenceSource):
 
         amplitude: Triple = Field(description="Amplitude of x, y, z; negative turns the sign [m]")
         frequency: Triple = Field(description="Angular frequency of x, y, z [rad/s]")
-        phase: Triple = Field(default=(0.0, 0.0, 0.0), description="Phase of x, y, z at the start [rad]")
+        phase: tuple[Heading, Heading, Heading] = Field(
+            default=(0.0, 0.0, 0.0), description="Phase of x, y, z at the start [rad]"
+        )
         offset: Triple = Field(default=(0.0, 0.0, 0.0), description="Centre of x, y, z [m]")
-        yaw: float = Field(default=0.0, description="Yaw angle [rad]")
+        yaw: Heading = Field(default=0.0, description="Yaw angle [rad]")
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
         setting = self.settings
         amplitude, omega = np.array([*setting.amplitude, 0.0]), np.array([*setting.frequency, 0.0])
         angle = np.multiply.outer(times, omega) + np.array([*setting.phase, 0.0])
-        return _table(
+        return stacked(
             np.array([*setting.offset, setting.yaw]) + amplitude * np.sin(angle),
             amplitude * omega * np.cos(angle),
             -amplitude * omega * omega * np.sin(angle),
@@ -190,7 +146,7 @@ class Square(ReferenceSource):
         amplitude: Triple = Field(description="Amplitude of x, y, z [m]")
         period: PositiveTriple = Field(description="Period of x, y, z [s]")
         time_constant: PositiveTriple = Field(description="Time constant of the filter of x, y, z [s]")
-        yaw_amplitude: float = Field(default=0.0, description="Amplitude of yaw [rad]")
+        yaw_amplitude: Heading = Field(default=0.0, description="Amplitude of yaw [rad]")
         yaw_period: float = Field(default=60.0, gt=0.0, description="Period of yaw [s]")
         yaw_time_constant: float = Field(default=0.5, gt=0.0, description="Time constant of the filter of yaw [s]")
         feed_forward: bool = Field(
@@ -207,7 +163,7 @@ class Square(ReferenceSource):
             strict=True,
         )
         four, rate, acceleration = np.stack([filtered_square(times, *axis) for axis in axes], axis=-1)
-        return _table(four, rate, acceleration if setting.feed_forward else np.zeros_like(acceleration))
+        return stacked(four, rate, acceleration if setting.feed_forward else np.zeros_like(acceleration))
 
 
 def filtered_square(times: Array, amplitude: float, period: float, time_constant: float) -> Array:
@@ -235,7 +191,7 @@ def filtered_square(times: Array, amplitude: float, period: float, time_constant
 @register("csv")
 @final
 class Csv(ReferenceSource):
-    """A table in a CSV file, interpolated smoothly; its last position is held after its end."""
+    """A table in a CSV file, interpolated smoothly; held at its first row before it and at its last after it."""
 
     class Settings(Strict):
         """Which file."""
@@ -263,6 +219,8 @@ class Csv(ReferenceSource):
     def __init__(self, settings: Settings) -> None:
         super().__init__(settings)
         columns = read_table(settings.text or "", settings.file)
+        self._span = float(columns["t"][0]), float(columns["t"][-1])
+        self.lowest_row = float(columns["z"].min())  # m
         # SciPy takes a third of a second to load, which a flight along any other reference need not spend.
         from rotorfault.reference.curve import Curve
 
@@ -270,88 +228,29 @@ class Csv(ReferenceSource):
             Curve(columns["t"], columns[axis], columns.get(rate), columns.get(acceleration))
             for axis, rate, acceleration in (("x", "vx", "ax"), ("y", "vy", "ay"), ("z", "vz", "az"))
         ]
-        # A logged yaw jumps by a full turn at the border; the vehicle does not.
-        yaw = np.unwrap(columns["yaw"]) if "yaw" in columns else np.zeros_like(columns["t"])
-        self._axes.append(Curve(columns["t"], yaw, columns.get("yaw_rate"), None))
+        self._axes.append(Curve(columns["t"], self._yaw(columns), columns.get("yaw_rate"), None))
+
+    def _yaw(self, columns: dict[str, Array]) -> Array:
+        """Yaw without the jumps by a turn that a log has at the border."""
+        times = columns["t"]
+        if "yaw" not in columns:
+            return np.zeros_like(times)
+        yaw, unclear = continuous_yaw(times, columns["yaw"], columns.get("yaw_rate"))
+        for row in unclear[:1]:
+            one, other = (float(columns["yaw"][k]) for k in (row, row + 1))
+            ways = f"by {other - one:.4g} rad or, over the border, by {math.remainder(other - one, TURN):.4g} rad"
+            told = "give rows closer in time" + ("" if "yaw_rate" in columns else ", or add the column yaw_rate")
+            raise InputError(
+                f"{self.settings.file}: yaw goes from {one:g} to {other:g} rad between t = {times[row]:g} s and "
+                f"{times[row + 1]:g} s: it is unclear whether it turns {ways}; {told}"
+            )
+        return yaw
+
+    def span(self) -> tuple[float, float]:
+        """From the first to the last row."""
+        return self._span
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
         four, rate, acceleration = np.stack([axis.evaluate(times) for axis in self._axes], axis=-1)
-        return _table(four, rate, acceleration)
-
-
-@register("function")
-@final
-class Function(ReferenceSource):
-    """A Python function of time that returns (x, y, z, yaw), or a `rotorfault.model.signals.Reference`."""
-
-    class Settings(Strict):
-        """Which function."""
-
-        function: Callable[[float], Any] | str = Field(
-            description="The function, or where it is: 'FILE.py:name' or 'package.module:name'. It takes the time "
-            "[s] and returns x, y, z [m] and yaw [rad], or a Reference with all derivatives"
-        )
-
-        def code(self) -> tuple[str, ...]:
-            """The function's place, where it is named and not handed in."""
-            return (self.function,) if isinstance(self.function, str) else ()
-
-        @field_serializer("function")
-        def _place(self, function: Callable[[float], Any] | str) -> str:
-            # A file cannot hold a function, but can say where it was; one of a module is found there again.
-            if isinstance(function, str):
-                return function
-            return f"{getattr(function, '__module__', '?')}:{getattr(function, '__qualname__', repr(function))}"
-
-    def __init__(self, settings: Settings) -> None:
-        super().__init__(settings)
-        given = settings.function
-        self._function = _import(given) if isinstance(given, str) else given
-        self._name = given if isinstance(given, str) else getattr(given, "__name__", repr(given))
-
-    def table(self, times: Array) -> ReferenceTable:
-        """The reference at the given instants; see `ReferenceSource.table`.
-
-        Raises
-        ------
-        InputError
-            If the function fails, or returns anything but four finite numbers or a finite `Reference`.
-        """
-        rows = np.array([self._row(float(time)) for time in times]).reshape(len(times), 12)
-        return ReferenceTable(rows[:, :3], rows[:, 3:6], rows[:, 6:9], rows[:, 9], rows[:, 10], rows[:, 11])
-
-    def _row(self, time: float) -> list[float]:
-        """The twelve numbers of a `Reference`, in its order."""
-        here = self._call(time)
-        if len(here) == 12:
-            return here
-        # Never before 0, where the function need not be defined: there the differences are taken one step later.
-        centre = max(time, STEP)
-        before, middle, after = (np.array(self._call(centre + step)) for step in (-STEP, 0.0, STEP))
-        acceleration = (after - 2.0 * middle + before) / (STEP * STEP)
-        rate = (after - before) / (2.0 * STEP) + acceleration * (time - centre)
-        return [*here[:3], *rate[:3], *acceleration[:3], here[3], rate[3], acceleration[3]]
-
-    def _call(self, time: float) -> list[float]:
-        where = f"reference function '{self._name}' at t = {time:g} s"
-        try:
-            answer = self._function(time)
-        except Exception as error:
-            raise InputError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from error
-        try:
-            numbers = [float(number) for number in (flatten(answer) if isinstance(answer, Reference) else answer)]
-        except (TypeError, ValueError):
-            numbers = []
-        if len(numbers) != (12 if isinstance(answer, Reference) else 4) or not all(map(math.isfinite, numbers)):
-            came = " ".join(repr(answer).split())[:80]
-            raise InputError(f"{where}: got {came}; allowed: four finite numbers (x, y, z, yaw), or a Reference")
-        return numbers
-
-
-def _import(place: str) -> Callable[[float], Sequence[float] | Reference]:
-    """Load a function from its place."""
-    function = foreign.load(place, "reference function")
-    if not callable(function):
-        raise InputError(f"reference function '{place}': it is no function; check the name")
-    return cast("Callable[[float], Sequence[float] | Reference]", function)
+        return stacked(four, rate, acceleration)

@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypeVar, cast
 from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
 
 from rotorfault.autopilot.response import ON_FAULT
+from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, TURN, radians
 from rotorfault.base.config import Strict, Three, passed_on, refusal, validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
@@ -35,13 +36,31 @@ MOST_SUBSTEPS = 1000  # per sampling period
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
 
+Lean = Annotated[float, radians(HALF_TURN)]
+Heading = Annotated[float, radians(TURN)]
+Rate = Annotated[float, radians(FASTEST_TURN, "rad/s")]
+
+
 class Start(Strict):
     """Where the flight begins; rotors start at hover thrust."""
 
     position: Three = Field(default=(0.0, 0.0, 0.0), description="x, y, z [m]")
     velocity: Three = Field(default=(0.0, 0.0, 0.0), description="[m/s], world frame")
-    attitude: Three = Field(default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]")
-    body_rates: Three = Field(default=(0.0, 0.0, 0.0), description="[rad/s], body frame")
+    attitude: tuple[Lean, Lean, Heading] = Field(default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]")
+    body_rates: tuple[Rate, Rate, Rate] = Field(default=(0.0, 0.0, 0.0), description="[rad/s], body frame")
+
+    @model_validator(mode="after")
+    def _upright(self) -> Start:
+        roll, pitch, _ = self.attitude
+        if (cosine := math.cos(roll) * math.cos(pitch)) < 0.0:
+            tilt = f"a tilt of {math.degrees(math.acos(cosine)):.4g} degrees"
+            meant = f"if degrees were meant, write [{math.radians(roll):.4g}, {math.radians(pitch):.4g}, ...]"
+            raise refusal(
+                "attitude",
+                f"got roll {roll:g} and pitch {pitch:g} rad, {tilt}; allowed: up to 90 degrees, beyond which a "
+                f"flight is lost; {meant}",
+            )
+        return self
 
 
 Factor = Annotated[float, Field(gt=0.0)]

@@ -128,14 +128,38 @@ def test_a_plain_python_object_may_command_rotors_too() -> None:
     assert flight.summary()["saturated_fraction"] == 0.0
 
 
-def test_four_numbers_without_a_name_are_neither() -> None:
+@pytest.mark.parametrize(
+    "answer",
+    [
+        (1.0, 2.0, 3.0), (4481.0,) * 4, [1, 2, 3, 4], np.ones(4), None, 5.0, Vec3(1.0, 2.0, 3.0),
+        Wrench("1", zeros()), Wrench(True, zeros()), Wrench(1.0, None), Wrench(np.ones(4), zeros()),
+        PerRotor(1.0, "2", 3.0, 4.0),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_numbers_without_a_name_are_neither_wrench_nor_thrusts(answer: Any) -> None:
+    """Four rotor speeds, say, must not be flown as a thrust and three torques."""
+
     class Bare:
         def update(self, *_: Any) -> Any:
-            return 1.0, 2.0, 3.0
+            return answer
 
-    message = r"Bare.update returned \(1.0, 2.0, 3.0\); allowed: Wrench\(.*, or PerRotor\(r1, r2, r3, r4\)"
+    message = r"Bare.update returned .*; allowed: Wrench\(.* in N and N m, or PerRotor\(r1, r2, r3, r4\) of thrusts"
     with pytest.raises(InputError, match=message):
         rotorfault.fly(scenario(), controller=Bare())
+
+
+@pytest.mark.parametrize("output", [ControlOutput((1.0, 2.0, 3.0, 4.0)), Wrench(1.0, zeros()), (1.0,) * 4], ids=repr)  # type: ignore[arg-type]
+@every_engine
+def test_a_block_gives_a_control_output_on_every_engine(output: Any, engine: str) -> None:
+    class Block(Controller[Nothing, Nothing]):
+        """Gives something else."""
+
+        def step(self, memory: Nothing, inputs: Any, parameters: Nothing, dt: Any) -> Any:
+            return memory, output, Nothing()
+
+    with pytest.raises(InputError, match=r"the controller's step gives .*; allowed: a ControlOutput with Wrench"):
+        rotorfault.fly(scenario(), controller=Block(), engine=engine)
 
 
 def test_their_loop_is_linearised_and_trimmed_like_any_other(paper_vehicle: Vehicle) -> None:

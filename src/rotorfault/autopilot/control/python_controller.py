@@ -14,8 +14,12 @@ from __future__ import annotations
 import traceback
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+from pydantic_core import PydanticCustomError
+
 from rotorfault.autopilot.control.protocol import CONTROLLER, ControlInputs, Controller, ControlOutput
+from rotorfault.autopilot.instant import DEMANDS
 from rotorfault.base.errors import InputError
+from rotorfault.base.number_rule import real, short
 from rotorfault.base.registry import Kind
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
@@ -74,7 +78,7 @@ class PythonController(Controller[Clock, Sampling]):
         Raises
         ------
         InputError
-            If it raises anything, or what it returns is neither a wrench nor commands of four numbers.
+            If it raises anything, or what it returns is neither a `Wrench` nor a `PerRotor`, of four numbers.
         """
         time = memory.steps * parameters.period
         name = type(self.inner).__name__
@@ -91,13 +95,13 @@ class PythonController(Controller[Clock, Sampling]):
 
 
 def _checked(demand: object, name: str) -> Wrench | PerRotor:
+    """A wrench or thrusts, of numbers; nothing else that holds four of them, for nobody knows what they are."""
     try:
-        first, second, third, fourth = (float(x) for x in flatten(demand))
-    except (TypeError, ValueError):
-        raise InputError(
-            f"controller {name}.update returned {demand!r}; allowed: Wrench(thrust, Vec3(roll, pitch, yaw)), or "
-            "PerRotor(r1, r2, r3, r4) of thrust commands"
-        ) from None
+        if not isinstance(demand, (Wrench, PerRotor)):
+            raise TypeError
+        first, second, third, fourth = (real(x) for x in flatten(demand))
+    except (TypeError, ValueError, PydanticCustomError):
+        raise InputError(f"controller {name}.update returned {short(demand)}; allowed: {DEMANDS}") from None
     if isinstance(demand, PerRotor):
         return PerRotor(first, second, third, fourth)
     return Wrench(first, Vec3(second, third, fourth))
