@@ -130,18 +130,25 @@ def _allowed(field: FieldInfo) -> str:
     if kind is float:
         return f"number{bounds}"
     if get_origin(kind) is tuple and Ellipsis not in options and options:
-        metadata: list[Any] = next((m.metadata for m in getattr(options[0], "__metadata__", ())), [])
-        return f"{len(options)} numbers{_bounds(metadata)}"
+        each = {_bounds(_metadata(option)) for option in options}
+        return f"{len(options)} numbers{each.pop() if len(each) == 1 else ''}"
     if get_origin(kind) is tuple:
         return "list of tables"
     return "table" if _inner(field.annotation)[0] else ""
 
 
+def _metadata(kind: Any) -> list[Any]:
+    """What stands beside a type in an annotation, with that of its fields."""
+    beside = getattr(kind, "__metadata__", ())
+    return [inner for one in beside for inner in (one.metadata if isinstance(one, FieldInfo) else [one])]
+
+
 def _bounds(metadata: list[Any]) -> str:
     signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-    found = {name: getattr(m, name) for name in signs for m in metadata if getattr(m, name, None) is not None}
+    every = {name: [getattr(m, name) for m in metadata if getattr(m, name, None) is not None] for name in signs}
+    found = {name: (max if name[0] == "g" else min)(each) for name, each in every.items() if each}
     if set(found) == {"ge", "le"}:
-        return f", {found['ge']:g} to {found['le']:g}"
+        return f", {found['ge']:.4g} to {found['le']:.4g}"
     return ",".join(f" {signs[name]} {value:g}" for name, value in found.items())
 
 

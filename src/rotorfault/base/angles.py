@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any, final
 
-from pydantic import AfterValidator
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from rotorfault.base.number_rule import refusal
 
@@ -26,8 +28,9 @@ def in_radians(value: float, unit: str = "rad") -> str:
     return f"{value:g} {unit}, which is {math.degrees(value):.6g} {degrees}"
 
 
-def radians(most: float, unit: str = "rad") -> AfterValidator:
-    """Refuse what is beyond -+ `most`, and say what it would be if degrees were meant.
+@final
+class Radians:
+    """Refuses what is beyond -+ `most`, and says what it would be if degrees were meant.
 
     Parameters
     ----------
@@ -37,12 +40,18 @@ def radians(most: float, unit: str = "rad") -> AfterValidator:
         rad or rad/s.
     """
 
-    def check(value: float) -> float:
-        if abs(value) > most:
-            degrees = unit.replace("rad", "degrees")
-            allowed = f"{-most:.5g} to {most:.5g} {unit}"
-            meant = f"if {value:g} {degrees} were meant, write {math.radians(value):.5g}"
-            raise refusal("", f"got {in_radians(value, unit)}; allowed: {allowed}; {meant}")
-        return value
+    def __init__(self, most: float, unit: str = "rad") -> None:
+        self.unit = unit
+        # By the names that documentation looks for.
+        self.ge, self.le = -most, most
 
-    return AfterValidator(check)
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def _check(self, value: float) -> float:
+        if not self.ge <= value <= self.le:
+            degrees = self.unit.replace("rad", "degrees")
+            allowed = f"{self.ge:.5g} to {self.le:.5g} {self.unit}"
+            meant = f"if {value:g} {degrees} were meant, write {math.radians(value):.5g}"
+            raise refusal("", f"got {in_radians(value, self.unit)}; allowed: {allowed}; {meant}")
+        return value

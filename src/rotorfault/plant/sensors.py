@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, radians
+from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, Radians
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
@@ -90,10 +90,10 @@ class Noisy(Sensors[NoisyMemory, NoisyParameters]):
 
         position: float = Field(0.005, ge=0.0, description="standard deviation of position [m]")
         velocity: float = Field(0.01, ge=0.0, description="standard deviation of velocity [m/s]")
-        attitude: Annotated[float, radians(HALF_TURN)] = Field(
+        attitude: Annotated[float, Radians(HALF_TURN)] = Field(
             0.002, ge=0.0, description="standard deviation of small rotations about each body axis [rad]"
         )
-        rate: Annotated[float, radians(FASTEST_TURN, "rad/s")] = Field(
+        rate: Annotated[float, Radians(FASTEST_TURN, "rad/s")] = Field(
             0.005, ge=0.0, description="standard deviation of the rates [rad/s]"
         )
         delay: int = Field(0, ge=0, le=100, description="sampling periods by which measurements come late")

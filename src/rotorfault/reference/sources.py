@@ -21,7 +21,7 @@ from typing import Annotated, Any, TypeAlias, final
 import numpy as np
 from pydantic import Field, model_validator
 
-from rotorfault.base.angles import TURN, radians
+from rotorfault.base.angles import TURN, Radians
 from rotorfault.base.config import Strict, read_text, refusal
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
@@ -30,7 +30,7 @@ from rotorfault.reference.csv_table import read_table
 from rotorfault.reference.protocol import ReferenceSource, ReferenceTable, stacked
 from rotorfault.reference.turns import continuous_yaw
 
-Heading: TypeAlias = Annotated[float, radians(TURN)]
+Heading: TypeAlias = Annotated[float, Radians(TURN)]
 Triple: TypeAlias = tuple[float, float, float]
 PositiveTriple: TypeAlias = tuple[
     Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]

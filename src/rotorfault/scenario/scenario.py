@@ -17,7 +17,7 @@ from typing import Annotated, Any, TypeVar, cast
 from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
 
 from rotorfault.autopilot.response import ON_FAULT
-from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, TURN, radians
+from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, TURN, Radians
 from rotorfault.base.config import Strict, Three, passed_on, refusal, validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
@@ -36,9 +36,9 @@ MOST_SUBSTEPS = 1000  # per sampling period
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
 
-Lean = Annotated[float, radians(HALF_TURN)]
-Heading = Annotated[float, radians(TURN)]
-Rate = Annotated[float, radians(FASTEST_TURN, "rad/s")]
+Lean = Annotated[float, Radians(HALF_TURN)]
+Heading = Annotated[float, Radians(TURN)]
+Rate = Annotated[float, Radians(FASTEST_TURN, "rad/s")]
 
 
 class Start(Strict):
