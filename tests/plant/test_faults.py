@@ -12,7 +12,8 @@ from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.model.block import Context, Nothing
 from rotorfault.model.signals import Command
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.plant import FAULT, rotor_faults
+from rotorfault.plant import FAULT, Fault, rotor_faults
+from rotorfault.plant.faults import Effect
 
 VEHICLE = load_vehicle("paper").vehicle
 CONTEXT = Context(VEHICLE, T)
@@ -101,6 +102,64 @@ def test_intermittent_equals_counting_steps(period, on):
     numbers = one.parameters(CONTEXT)
     got = [1.0 - one.at(k * T, Nothing(), numbers).effectiveness for k in range(3200)]
     assert got == [1.0 if 100 <= k < 3000 and (k - 100) % period < on else 0.0 for k in range(3200)]
+
+
+@pytest.mark.parametrize("name", list(FAULT.registry))
+@pytest.mark.parametrize("dt", [0.095, 0.3, 7.0])
+def test_a_fault_acts_over_a_step_with_its_mean(name, dt):
+    """Whatever begins or ends in the step, and however many bursts: against the sum of ten thousand instants."""
+    settings, _ = TIMELINES[name]
+    one = fault(name, rotor=1, **settings)
+    numbers, shares = one.parameters(CONTEXT), set()
+    for time in np.arange(0.7, 3.3, 0.0911):
+        said = one.over(time, dt, Nothing(), numbers)
+        instants = one.at(time + (np.arange(10_000) + 0.5) * dt / 10_000, Nothing(), numbers)
+        assert said.effectiveness == pytest.approx(np.mean(instants.effectiveness), abs=2e-4)
+        assert said.stuck == pytest.approx(np.mean(instants.stuck), abs=2e-4)
+        shares.add(round(said.stuck + 1.0 - said.effectiveness, 6))
+    assert len(shares) > 2, "some steps have a part of it"
+
+
+def test_a_fault_that_falls_on_a_step_acts_from_it_on_exactly():
+    one = fault("step", rotor=1, time=0.0, loss=1.0)
+    for k in range(1, 20000, 7):
+        numbers = one.parameters(CONTEXT)._replace(time=round(k / 1000, 3))
+        assert one.over((k - 1) * T, T, Nothing(), numbers).effectiveness == 1.0
+        assert one.over(k * T, T, Nothing(), numbers).effectiveness == 0.0
+
+
+@pytest.mark.parametrize(("period", "on"), [(10, 3), (7, 1), (40, 40), (333, 332)])
+def test_bursts_of_whole_steps_act_in_them_and_in_no_other(period, on):
+    one = fault("intermittent", rotor=1, start=0.1, end=3.0, period=period * T, duty=on / period, loss=1.0)
+    numbers = one.parameters(CONTEXT)
+    got = [1.0 - one.over(k * T, T, Nothing(), numbers).effectiveness for k in range(3200)]
+    assert got == [1.0 if 100 <= k < 3000 and (k - 100) % period < on else 0.0 for k in range(3200)]
+
+
+@pytest.mark.parametrize(("period", "duty"), [(0.00517, 0.37), (0.00251, 0.5), (0.0303, 0.97)])
+def test_bursts_between_steps_last_as_long_as_they_should(period, duty):
+    one = fault("intermittent", rotor=1, start=0.1003, end=0.1003 + 300 * period, period=period, duty=duty, loss=0.5)
+    numbers = one.parameters(CONTEXT)
+    lost = sum(1.0 - one.over(k * T, T, Nothing(), numbers).effectiveness for k in range(10_000)) * T
+    assert lost == pytest.approx(0.5 * duty * 300 * period, rel=1e-5)
+
+
+def test_a_stuck_rotor_takes_over_within_a_step():
+    """The last listed that is stuck holds, each for its share of the step."""
+    faults = [fault("stuck", rotor=1, time=0.25, thrust=2.0), fault("stuck", rotor=1, time=0.5, thrust=6.0)]
+    numbers, memories = [f.parameters(CONTEXT) for f in faults], [Nothing()] * 2
+    over = rotor_faults(faults, memories, numbers, 0.0, 1.0)
+    after = rotor_faults(faults, memories, numbers, 1.0, 1.0)
+    assert (after.stuck.r1, after.stuck_thrust.r1) == (1.0, 6.0)
+    assert over.stuck_thrust.r1 == pytest.approx(0.5 * 6.0 + 0.5 * 0.75 * 2.0, rel=1e-5)
+
+
+def test_a_fault_of_ones_own_acts_with_its_middle_over_a_step():
+    class Own(Fault):
+        def at(self, time, memory, parameters):
+            return Effect(1.0 - 0.1 * time)
+
+    assert Own().over(1.0, 0.5, Nothing(), Nothing()).effectiveness == 1.0 - 0.1 * 1.25
 
 
 def test_a_stuck_rotor_delivers_its_thrust_whatever_is_commanded():

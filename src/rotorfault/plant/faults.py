@@ -4,6 +4,10 @@ A *loss* is the lost share of thrust; the *effectiveness* is what remains, 1 - l
 the product of what they leave. A stuck rotor delivers a thrust of its own, whatever is commanded and whatever else
 is wrong with it. Times and losses are numbers in the parameters, so that they may differ between the flights of a
 batch; which rotor is hit is a choice of structure.
+
+A fault is asked two things: what it does at a time (`Fault.at`: what is recorded and measured), and what it does on
+average over an integration step (`Fault.over`: what acts on the body). The second is known in closed form, so that an
+onset between two steps acts from its own time on, with its share of the step, and a burst lasts as long as it should.
 """
 
 from __future__ import annotations
@@ -25,7 +29,8 @@ from rotorfault.maths.scalar import (
     greater_equal,
     less,
     less_equal,
-    select,
+    minimum,
+    nearest,
     wrap_angle,
 )
 from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT
@@ -34,21 +39,24 @@ from rotorfault.plant.timed import Timed
 
 # Times are counted steps times a period, and may fall short of the time that was meant by rounding.
 TIME_TOLERANCE = 1e-9  # s
+_ROUNDING = 1e-6  # of an integration step: a share that differs by less from none or all of it is that
 
 
 class RotorFault(NamedTuple):
     """State of the four rotors at one time."""
 
     effectiveness: PerRotor  # 1 sound .. 0 dead
-    stuck: PerRotor  # 1 where the rotor does not follow its command
-    stuck_thrust: PerRotor  # N, delivered where stuck
+    stuck: (
+        PerRotor  # 1 where the rotor does not follow its command; over a step, the share of it in which it does not
+    )
+    stuck_thrust: PerRotor  # N, delivered where stuck, times that share
 
 
 class Effect(NamedTuple):
-    """What a fault does to its rotor at one time."""
+    """What a fault does to its rotor at one time, or on average over a step."""
 
     effectiveness: Scalar = 1.0  # what it leaves of the thrust
-    stuck: Scalar = 0.0  # 1 where the rotor does not follow its command
+    stuck: Scalar = 0.0  # 1 where the rotor does not follow its command; over a step, the share in which it does not
     stuck_thrust: Scalar = 0.0  # N, delivered then
 
 
@@ -69,6 +77,21 @@ class Fault(Timed[Effect, MemoryT, ParametersT]):
         """Number of the rotor that it hits, from 1."""
         number: int = self.settings.rotor
         return number
+
+    def over(self, time: Scalar, dt: Scalar, memory: MemoryT, parameters: ParametersT) -> Effect:
+        """What it does on average over an integration step; what it does in the middle of it, if a part says no more.
+
+        Parameters
+        ----------
+        time : scalar, s
+            At the beginning of the step.
+        dt : scalar, s
+            Its length.
+        memory : record
+            Of the sampling period that it lies in.
+        parameters : record
+        """
+        return self.at(time + 0.5 * dt, memory, parameters)
 
     def onset(self, parameters: ParametersT) -> Scalar:
         """Time of its first effect in s."""
@@ -95,10 +118,24 @@ def since(time: Scalar, start: Scalar) -> Scalar:
     return greater_equal(time, start - TIME_TOLERANCE)
 
 
+def share_since(time: Scalar, dt: Scalar, start: Scalar) -> Scalar:
+    """Share of the step of length `dt` from `time` on that is not before `start`; all in s."""
+    return _whole((time + dt - start) / dt)
+
+
+def _whole(share: Scalar) -> Scalar:
+    """A share of a step, 0 and 1 where it is that but for rounding."""
+    return clip((share - _ROUNDING) * (1.0 / (1.0 - 2.0 * _ROUNDING)), 0.0, 1.0)
+
+
 def rotor_faults(
-    faults: Sequence[Fault[Any, Any]], memories: Sequence[Any], parameters: Sequence[Any], time: Scalar
+    faults: Sequence[Fault[Any, Any]],
+    memories: Sequence[Any],
+    parameters: Sequence[Any],
+    time: Scalar,
+    dt: Scalar | None = None,
 ) -> RotorFault:
-    """Combine all faults at one time.
+    """Combine all faults at one time, or over an integration step.
 
     Parameters
     ----------
@@ -107,6 +144,8 @@ def rotor_faults(
         One for each fault.
     time : scalar, s
         Since the start of the flight.
+    dt : scalar, s, optional
+        Length of the step that begins then; the time alone if not given.
 
     Returns
     -------
@@ -119,10 +158,10 @@ def rotor_faults(
     thrust: list[Scalar] = [0.0] * 4
     for fault, memory, numbers in zip(faults, memories, parameters, strict=True):
         i = fault.rotor - 1
-        effect = fault.at(time, memory, numbers)
+        effect = fault.at(time, memory, numbers) if dt is None else fault.over(time, dt, memory, numbers)
         effectiveness[i] = effectiveness[i] * effect.effectiveness
         stuck[i] = either(stuck[i], effect.stuck)
-        thrust[i] = select(effect.stuck, effect.stuck_thrust, thrust[i])
+        thrust[i] = (1.0 - effect.stuck) * thrust[i] + effect.stuck * effect.stuck_thrust
     return RotorFault(PerRotor(*effectiveness), PerRotor(*stuck), PerRotor(*thrust))
 
 
@@ -173,6 +212,10 @@ class Step(Fault[Nothing, StepParameters]):
         """1 before, 1 - loss from the time on."""
         return Effect(1.0 - parameters.loss * since(time, parameters.time))
 
+    def over(self, time: Scalar, dt: Scalar, memory: Nothing, parameters: StepParameters) -> Effect:
+        """The loss in the share of the step that comes after its time."""
+        return Effect(1.0 - parameters.loss * share_since(time, dt, parameters.time))
+
 
 class RampParameters(NamedTuple):
     """Numbers of a gradual loss."""
@@ -208,6 +251,14 @@ class Ramp(Fault[Nothing, RampParameters]):
         """Falls linearly from 1 to 1 - loss between the two times."""
         share = clip((time - parameters.start) / (parameters.end - parameters.start), 0.0, 1.0)
         return Effect(1.0 - parameters.loss * share)
+
+    def over(self, time: Scalar, dt: Scalar, memory: Nothing, parameters: RampParameters) -> Effect:
+        """The mean of what lies of it in the step, and of what is constant before and after."""
+        # All in steps, from the beginning of this one.
+        start, end = (parameters.start - time) / dt, (parameters.end - time) / dt
+        first, last = clip(start, 0.0, 1.0), clip(end, 0.0, 1.0)
+        rising = 0.5 * (last - first) * ((first - start) + (last - start)) / (end - start)
+        return Effect(1.0 - parameters.loss * (rising + (1.0 - last)))
 
 
 class IntermittentParameters(NamedTuple):
@@ -248,11 +299,25 @@ class Intermittent(Fault[Nothing, IntermittentParameters]):
     def at(self, time: Scalar, memory: Nothing, parameters: IntermittentParameters) -> Effect:
         """1 - loss in the first `duty` of each period between start (included) and end (excluded), else 1."""
         p = parameters
-        # A remainder without floor, which symbols lack: the angle from the middle of the time on, wrapped to a turn.
+        # The angle from the middle of the time on, wrapped to a turn: a remainder without floor, which symbols lack.
         turns = (time - p.start + TIME_TOLERANCE) / p.period
         on = less_equal(absolute(wrap_angle((2.0 * math.pi) * (turns - 0.5 * p.duty))), math.pi * p.duty)
         within = both(since(time, p.start), less(time, p.end - TIME_TOLERANCE))
         return Effect(1.0 - p.loss * both(on, within))
+
+    def over(self, time: Scalar, dt: Scalar, memory: Nothing, parameters: IntermittentParameters) -> Effect:
+        """The loss in the share of the step that bursts fill."""
+        p = parameters
+        first, last = (clip(t, p.start, p.end) - p.start for t in (time, time + dt))
+        # Time on since the start is duty times the time, and what the running period is ahead of that.
+        on = p.duty * (last - first) + p.period * (_ahead(last / p.period, p.duty) - _ahead(first / p.period, p.duty))
+        return Effect(1.0 - p.loss * _whole(on / dt))
+
+
+def _ahead(turns: Scalar, duty: Scalar) -> Scalar:
+    """How far the time on is ahead of its mean after a number of periods, in periods: 0 after whole ones."""
+    gone = turns - nearest(turns - 0.5)  # since the running period began; of two nearest, either serves
+    return minimum(gone, duty) - duty * gone
 
 
 class StuckParameters(NamedTuple):
@@ -284,6 +349,10 @@ class Stuck(Fault[Nothing, StuckParameters]):
     def at(self, time: Scalar, memory: Nothing, parameters: StuckParameters) -> Effect:
         """Held from the time on."""
         return Effect(1.0, since(time, parameters.time), parameters.thrust)
+
+    def over(self, time: Scalar, dt: Scalar, memory: Nothing, parameters: StuckParameters) -> Effect:
+        """Held in the share of the step that comes after the time."""
+        return Effect(1.0, share_since(time, dt, parameters.time), parameters.thrust)
 
 
 class TotalParameters(NamedTuple):
@@ -317,3 +386,7 @@ class Total(Fault[Nothing, TotalParameters]):
     def at(self, time: Scalar, memory: Nothing, parameters: TotalParameters) -> Effect:
         """1 before, 0 from the time on."""
         return Effect(1.0 - since(time, parameters.time))
+
+    def over(self, time: Scalar, dt: Scalar, memory: Nothing, parameters: TotalParameters) -> Effect:
+        """The whole thrust in the share of the step that comes before the time."""
+        return Effect(1.0 - share_since(time, dt, parameters.time))

@@ -2,8 +2,8 @@
 
 The command is held over the period, and so are the memories of wind and faults. The rotor lag is known in closed form
 and drives the body, which is integrated (`rotorfault.plant.rotors`). Wind is taken at the stage times of the
-integrator; faults once at the start of each sub-step, so that one that sets in on a sub-step's boundary acts exactly
-from there on and never costs the integrator its order.
+integrator; faults act over each sub-step with their mean over it, so that one that sets in on a sub-step's boundary
+acts exactly from there on and never costs the integrator its order.
 Ground is a choice of structure: a flight without it has none of its operations.
 """
 
@@ -175,7 +175,7 @@ class Plant:
         dt: Scalar,
     ) -> PlantState:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
-        fault = self.fault(time, held, parameters)
+        fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt)
         lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
         times = (time, time + 0.5 * dt, time + dt)
         first, middle, last = (
@@ -199,7 +199,7 @@ class Plant:
         output : PerRotor, N
             Lag outputs.
         fault : RotorFault
-            Held over the integration step.
+            Mean over the integration step.
         held : Held
             Memories of wind and faults.
         parameters : PlantParameters

@@ -98,13 +98,18 @@ def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> Per
 def delivered_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
     """Thrusts in N that act on the body, for lag outputs in N."""
     followed = output * (fault.effectiveness * vehicle.rotor_gain)
-    return fault.stuck.map(select, fault.stuck_thrust, followed)
+    return _held(followed, fault)
 
 
 def true_rotor_speeds(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
     """Rotor speeds in rad/s, without sign, for lag outputs in N."""
     sound = output * vehicle.rotor_gain
-    return rotor_speeds(vehicle, fault.stuck.map(select, fault.stuck_thrust, sound))
+    return rotor_speeds(vehicle, _held(sound, fault))
+
+
+def _held(followed: PerRotor, fault: RotorFault) -> PerRotor:
+    """Thrusts in N, those of stuck rotors in place of those that follow; over a step, each for its share of it."""
+    return followed.map(lambda f, share, held: (1.0 - share) * f + held, fault.stuck, fault.stuck_thrust)
 
 
 def true_loss(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
