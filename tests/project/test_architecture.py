@@ -30,7 +30,10 @@ LAZY = {
     "rotorfault.bench.study": {"rotorfault.bench.accuracy_figure": MATPLOTLIB},
     "rotorfault.campaigns.api": {"rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load"},
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
-    "rotorfault.cli.catalogue": {"rotorfault.results.dataset": "xarray takes longer to load than a file to check"},
+    "rotorfault.cli.catalogue": {
+        "rotorfault.flight.assembly": "is needed to check a scenario, and for no list",
+        "rotorfault.results.dataset": "xarray takes longer to load than a file to check",
+    },
     "rotorfault.engine": {
         "rotorfault.engine.arrays": "one engine flies, the others need not load",
         "rotorfault.engine.python": "the same",

@@ -15,7 +15,6 @@ from rotorfault.campaigns.studies import study_names
 from rotorfault.engine import ENGINES
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
 from rotorfault.plant import FAULT, PLANT
-from rotorfault.reference import REFERENCE
 from rotorfault.scenario.library import load_scenario, new_scenario, scenario_names
 from rotorfault.scenario.scenario import scenario_from
 from rotorfault.scenario.slots import SLOTS
@@ -114,7 +113,10 @@ def check(path: Path, allow_code: bool = False) -> str:
         vehicle = load_vehicle(path)
         return f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
     scenario = load_scenario(path, allow_code=allow_code)
-    scenario[REFERENCE].make()
+    # Compiles nothing: parts, start and reference, as a flight would have them.
+    from rotorfault.flight.assembly import assemble
+
+    assemble(scenario)
     return (
         f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on "
         f"{scenario[PLANT].kind} flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"

@@ -77,10 +77,11 @@ def _name(scenario: Scenario) -> str:
 def _warn(scenario: Scenario) -> None:
     """Say what is likely not meant, before it is flown."""
     from rotorfault.analysis.sampling_check import sampled_data_warnings
+    from rotorfault.flight.reference_rows import unflown
     from rotorfault.model.block import Context
     from rotorfault.plant import FAULT
 
-    for warning in sampled_data_warnings(scenario):
+    for warning in [*sampled_data_warnings(scenario), *unflown(scenario)]:
         typer.echo(f"warning: {warning}", err=True)
     vehicle = scenario.mismatch.applied(scenario.vehicle.vehicle)
     for number, part in enumerate(scenario.all(FAULT)):

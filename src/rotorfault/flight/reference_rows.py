@@ -100,6 +100,29 @@ def require_above_ground(
         )
 
 
+def unflown(scenario: Scenario) -> list[str]:
+    """What of a table in a file is not flown, or where it says nothing; a line for each.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+    source, end = scenario[REFERENCE].make(), scenario.duration
+    span = source.span()
+    if not isinstance(source, Csv) or span is None:
+        return []
+    told = []
+    if span[0] > 0.0:
+        told.append(f"the reference's table begins at {span[0]:g} s; until then its first row is held")
+    if span[0] < 0.0:
+        told.append(f"the reference's table begins at {span[0]:g} s; what comes before 0 s is not flown")
+    if span[1] > end + scenario.period:
+        told.append(f"the reference's table ends at {span[1]:g} s; what comes after {end:g} s is not flown")
+    elif span[1] < end - scenario.period:
+        told.append(f"the reference's table ends at {span[1]:g} s; from then on its last row is held")
+    return told
+
+
 def _require_in_flight(source: ReferenceSource, duration: float) -> None:
     """Refuse what would say nothing in the whole flight but where to stay."""
     span = source.span()
