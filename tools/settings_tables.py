@@ -230,7 +230,8 @@ def _vehicle_table() -> str:
         if name == "rotor":
             continue
         unit = units.get(name, "")
-        default = "required" if field.is_required() else _value(field.default)
+        # Of a quantity the number alone, in the unit beside it.
+        default = "required" if field.is_required() else _value(getattr(field.default, "value", field.default))
         rows.append([f"`{name}`", default, unit, _without_unit(field.description or "", unit)])
     rotor = VehicleFile.model_fields["rotor"]
     rows.append(["`[[rotor]]`", "required", "", rotor.description or ""])

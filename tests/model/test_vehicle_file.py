@@ -29,7 +29,7 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     assert file.name == name
     assert file.description
     assert 1.5 < file.thrust_to_weight < 4.0
-    assert len(dict(file.quantities())) == 13 + 8
+    assert len(dict(file.quantities())) == 14 + 8
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
 
 

@@ -14,7 +14,7 @@ from rotorfault.autopilot.allocation.accounting import account, direct
 from rotorfault.autopilot.control.protocol import ControlOutput
 from rotorfault.autopilot.diagnosis.protocol import Oracle
 from rotorfault.autopilot.instant import Decision, Instant, Past
-from rotorfault.autopilot.rotor_model import follow, rotors_at_hover
+from rotorfault.autopilot.rotor_model import believed_residual_speed, follow, rotors_at_hover
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
@@ -84,7 +84,8 @@ class Autopilot:
         """
         hover = hover_thrust(vehicle)
         held = hover / vehicle.rotor_gain
-        past = Past(rotors_at_hover(vehicle), (), Command(held, zeros()), 0.0)
+        rotors = rotors_at_hover(vehicle)
+        past = Past(rotors, (), Command(held, zeros()), 0.0, believed_residual_speed(rotors, vehicle))
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
         wrench = Wrench(hover.sum(), zeros())
@@ -160,6 +161,7 @@ class Autopilot:
             previous=instant.expectation.now,
             command=command,
             elapsed=dt,
+            residual_speed=instant.expectation.residual_speed,
         )
         report = AutopilotReport(instant, wrench, allocation, telemetry)
         return AutopilotMemory(past, self._record(*memories)), command, report

@@ -12,7 +12,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import angular_acceleration, drag_acceleration
 from rotorfault.model.signals import Motion
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, wrench_of
 
 
 class Expectation(NamedTuple):
@@ -23,6 +23,7 @@ class Expectation(NamedTuple):
     mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the period
     thrust: PerRotor  # N: thrust of sound rotors now
     residual_speed: Scalar  # rad/s: believed Omega of (4)
+    residual_change: Scalar  # rad/s: by which it has changed over the period
     direct_acceleration_W: Vec3  # m/s^2: commanded over the period, zero without the option `six_inputs`
     elapsed: Scalar  # s: time since the last instant; 0 at the first, so that nothing is predicted there
 
@@ -35,7 +36,7 @@ class Prediction(NamedTuple):
 
 
 def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Prediction:
-    """Velocity changes that the believed rotors, gravity, drag and gyroscopics explain.
+    """Velocity changes that the believed rotors, their reaction, gravity, drag and gyroscopics explain.
 
     Parameters
     ----------
@@ -58,4 +59,9 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Predi
         + e.direct_acceleration_W
     )
     turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
-    return Prediction(acceleration_W * e.elapsed, turn * e.elapsed)
+    return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle))
+
+
+def reaction(expectation: Expectation, vehicle: Vehicle) -> Vec3:
+    """Change of the body rates in rad/s over the last period by the believed rotors' change of speed."""
+    return Vec3(0.0, 0.0, -rate_against_rotors(vehicle, expectation.residual_change))

@@ -82,7 +82,12 @@ class _TaylorPlant:
         )
         command, fault, memory, parameters = numbers
         body_dot = plant.derivative(
-            body, plant.forcing(hy.time, rotors, fault, memory, parameters), command, parameters
+            body,
+            plant.forcing(
+                hy.time, rotors, plant.residual_speed(rotors, fault, parameters), fault, memory, parameters
+            ),
+            command,
+            parameters,
         )
         dot = (body_dot, lag_derivative(parameters.vehicle, rotors, command.thrust))
         right = [hy.expression(e) if isinstance(e, float) else e for e in flatten(dot)]
@@ -103,13 +108,16 @@ class _TaylorPlant:
     ) -> PlantState:
         """State one sampling period later; see `Plant.step`."""
         plant, taylor = self._plant, self._integrator
-        values = (plant.limited(command, parameters), plant.fault(time, held, parameters), held, parameters)
+        fault = plant.fault(time, held, parameters)
+        values = (plant.limited(command, parameters), fault, held, parameters)
         taylor.pars[:] = flatten(values)[: len(taylor.pars)]  # it keeps them up to the last that the motion needs
-        taylor.state[:] = flatten((state.body, state.rotors))
+        before = plant.residual_speed(state.rotors, fault, parameters)
+        taylor.state[:] = flatten((plant.stopped(state.body, before, parameters), state.rotors))
         taylor.time = time
         if taylor.propagate_for(period)[0] != self._reached:
             raise OverflowError("the motion has no finite numbers")  # a lost flight, for the engine
-        body, rotors = unflatten((state.body, state.rotors), taylor.state.tolist())
+        stopped, rotors = unflatten((state.body, state.rotors), taylor.state.tolist())
+        body = plant.turning(stopped, plant.residual_speed(rotors, fault, parameters), parameters)
         return PlantState(plant.model.after_step(body), rotors)
 
 

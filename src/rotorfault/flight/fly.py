@@ -162,6 +162,7 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
         )
     if attributes["format"] == OLD_FORMAT:
         _without_presets(tables)
+    _without_reaction(tables)
     scenario = scenario_from(tables, str(path), allow_code)
     return fly(scenario, engine=engine or str(attributes["engine"]))
 
@@ -172,6 +173,14 @@ def _without_presets(tables: dict[str, Any]) -> None:
         part = tables.get(slot.name)
         if slot.presets is not None and isinstance(part, dict) and slot.presets(part["kind"]):
             part.setdefault("preset", NO_PRESET)
+
+
+def _without_reaction(tables: dict[str, Any]) -> None:
+    """Say of a vehicle that has been flown before rotors could turn the body that its rotors did not."""
+    vehicle = tables.get("vehicle")
+    if isinstance(vehicle, dict):
+        none = {"value": 0.0, "unit": "1", "source": "flown before there was a reaction of rotors"}
+        vehicle.setdefault("rotor_reaction", none)
 
 
 def _run(batch: Batch, engine: str, period: float) -> Recording:

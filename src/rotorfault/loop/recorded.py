@@ -45,7 +45,7 @@ class LoopSignals(NamedTuple):
     thrust_command: Annotated[PerRotor, Q("N", NO_FRAME, "commanded thrust")]
     thrust: Annotated[PerRotor, Q("N", NO_FRAME, "true thrust")]
     expected_thrust: Annotated[PerRotor, Q("N", NO_FRAME, "thrust of sound rotors as believed")]
-    rotor_speed: Annotated[PerRotor, Q("rad/s", NO_FRAME, "true rotor speed, without sign")]
+    rotor_speed: Annotated[PerRotor, Q("rad/s", NO_FRAME, "true rotor speed; negative if it gives negative thrust")]
     loss_true: Annotated[PerRotor, Q("1", NO_FRAME, "true loss of effectiveness")]
     loss_estimated: Annotated[PerRotor, Q("1", NO_FRAME, "estimated loss before any decision")]
     loss_believed: Annotated[PerRotor, Q("1", NO_FRAME, "smoothed loss of flagged rotors; acted upon")]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, maximum, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.signals import Wrench
 
 
@@ -36,6 +36,7 @@ class Vehicle(NamedTuple):
     rotor_gain: Scalar  # thrust per commanded thrust (k)
     linear_drag: Scalar  # N s/m, force per speed relative to the air (k_d)
     gravity: Scalar  # m/s^2
+    rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
 
 
 def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:
@@ -51,8 +52,16 @@ def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:
 
 
 def rotor_speeds(vehicle: Vehicle, thrust: PerRotor) -> PerRotor:
-    """Rotor speeds in rad/s at which sound rotors give these thrusts in N; 0 for negative ones."""
-    return thrust.map(lambda f: sqrt(maximum(f, 0.0) / vehicle.thrust_coefficient))
+    """Rotor speeds in rad/s at which sound rotors give these thrusts in N; negative for one that turns the other way.
+
+    So a rotor that is reversed pulls down, and its drag torque and its momentum have the other sign too.
+    """
+
+    def speed(thrust: Scalar) -> Scalar:
+        size = sqrt(absolute(thrust) / vehicle.thrust_coefficient)
+        return select(less(thrust, 0.0), -size, size)
+
+    return thrust.map(speed)
 
 
 def residual_speed(vehicle: Vehicle, speeds: PerRotor) -> Scalar:
@@ -64,13 +73,35 @@ def residual_speed(vehicle: Vehicle, speeds: PerRotor) -> Scalar:
     return -speeds.dot(vehicle.rotor_yaw_sign)
 
 
+def rotor_momentum(vehicle: Vehicle, residual: Scalar) -> Scalar:
+    """Angular momentum of all rotors about body z in N m s, J_r Omega; `residual` is Omega of (4) in rad/s."""
+    momentum: Scalar = vehicle.rotor_inertia * residual
+    return momentum
+
+
+def rate_against_rotors(vehicle: Vehicle, residual: Scalar) -> Scalar:
+    """Yaw rate in rad/s by which the body turns slower for the momentum that its rotors have.
+
+    No torque from outside is in a change of rotor speed: J_z r + J_r Omega stays, so the body is turned by
+    -J_r dOmega/dt. A vehicle's `rotor_reaction` says whether this is modelled.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    residual : scalar, rad/s
+        Omega of (4).
+    """
+    rate: Scalar = rotor_momentum(vehicle, residual) * (vehicle.rotor_reaction / vehicle.inertia.z)
+    return rate
+
+
 def gyroscopic_torque(vehicle: Vehicle, omega_B: Vec3, residual: Scalar) -> Vec3:
     """Torque on the body from turning the rotors' angular momentum, in N m about the body axes.
 
     - omega x (J_r Omega e_z) = J_r Omega (-q, p, 0): it does no work (omega . tau = 0), which settles the sign of
     the pitch row that (3) prints wrongly.
     """
-    momentum = vehicle.rotor_inertia * residual
+    momentum = rotor_momentum(vehicle, residual)
     return Vec3(-omega_B.y * momentum, omega_B.x * momentum, 0.0)
 
 

@@ -98,6 +98,12 @@ class VehicleFile(Strict):
     rotor_gain: Annotated[Quantity, _positive("1")] = Field(description="thrust per commanded thrust (k)")
     linear_drag: Annotated[Quantity, _not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
     gravity: Annotated[Quantity, _positive("m/s^2")] = Field(description="m/s^2")
+    rotor_reaction: Annotated[
+        Quantity, _in("1", lambda value: 0.0 <= value <= 1.0, "0 (without) to 1 (as it is)")
+    ] = Field(
+        default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
+        description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
+    )
     rotor: tuple[Rotor, ...] = Field(description="four rotors in any order: two pairs, opposite each other")
 
     @model_validator(mode="after")
@@ -207,6 +213,7 @@ class VehicleFile(Strict):
             rotor_gain=self.rotor_gain.value,
             linear_drag=self.linear_drag.value,
             gravity=self.gravity.value,
+            rotor_reaction=self.rotor_reaction.value,
         )
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:

@@ -60,6 +60,16 @@ class BodyModel(Block[State, BodyT, BodyT, Nothing]):
         """
         raise NotImplementedError(f"{type(self).__name__} has no derivative")
 
+    def turned(self, body: BodyT, rate: Scalar) -> BodyT:
+        """The state with its rate about body z changed by so much [rad/s].
+
+        The plant needs it for the reaction of rotors. As it is here it serves models that have body rates `omega_B`.
+        """
+        omega_B = getattr(body, "omega_B", None)
+        if omega_B is None:
+            raise NotImplementedError(f"{type(self).__name__} has no turned, and its state no omega_B")
+        return body._replace(omega_B=omega_B + Vec3(0.0, 0.0, rate))  # type: ignore[attr-defined,no-any-return]
+
     def after_step(self, body: BodyT) -> BodyT:
         """Put a state that an integration step has left back on its constraints, if it has any."""
         return body

@@ -62,6 +62,10 @@ class PaperModel(BodyModel[PaperState]):
             attitude_rate=angular_acceleration(vehicle, wrench.torque_B, body.attitude_rate, residual_speed),
         )
 
+    def turned(self, body: PaperState, rate: Scalar) -> PaperState:
+        """The state with its yaw rate changed by so much [rad/s]."""
+        return body._replace(attitude_rate=body.attitude_rate + Vec3(0.0, 0.0, rate))
+
     def observe(self, body: PaperState) -> State:
         """The state as it is; omega_B holds the Euler rates."""
         return State(body.p_W, body.v_W, Quat.from_euler(body.attitude), body.attitude_rate)

@@ -5,6 +5,11 @@ and drives the body, which is integrated (`rotorfault.plant.rotors`). Wind is ta
 integrator; faults act over each sub-step with their mean over it, so that one that sets in on a sub-step's boundary
 acts exactly from there on and never costs the integrator its order.
 Ground is a choice of structure: a flight without it has none of its operations.
+
+A rotor that speeds up turns the body the other way: what only outside torques change is J_z r + J_r Omega, body and
+rotors together. So that is integrated, as the rate about body z that the body would have if its rotors were stopped
+without a torque from outside; its own rate follows from the rotors' speeds, which are known. Momentum is then kept to
+rounding, and no derivative of a speed is needed (at a standing rotor there is none).
 """
 
 from __future__ import annotations
@@ -17,7 +22,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
-from rotorfault.model.vehicle import Vehicle, residual_speed, wrench_of
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.integrator import rk4
@@ -55,7 +60,7 @@ class Truth(NamedTuple):
     state: State
     specific_force_B: Vec3  # m/s^2: acceleration less gravity; without the unphysical input of `six_inputs`
     thrust: PerRotor  # N, delivered
-    rotor_speed: PerRotor  # rad/s, without sign
+    rotor_speed: PerRotor  # rad/s, negative where reversed
     loss: PerRotor  # 0 sound .. 1 dead
     air: Air
     ground_force: Scalar  # N, upwards
@@ -177,19 +182,38 @@ class Plant:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
         fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt)
         lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
-        times = (time, time + 0.5 * dt, time + dt)
+        start, half, end = (self.residual_speed(output, fault, parameters) for output in lag.outputs)
+        times, speeds = (time, time + 0.5 * dt, time + dt), (start - (start - end) * lag.sag, half, end)
         first, middle, last = (
-            self.forcing(at, output, fault, held, parameters) for at, output in zip(times, lag.stages, strict=True)
+            self.forcing(*at, fault, held, parameters) for at in zip(times, lag.driving, speeds, strict=True)
         )
 
-        def derivative(body: Any, forcing: Forcing) -> Any:
-            return self.derivative(body, forcing, command, parameters)
+        def derivative(stopped: Any, forcing: Forcing) -> Any:
+            return self.derivative(stopped, forcing, command, parameters)
 
-        body = rk4(derivative, state.body, (first, middle, last), dt)
-        return PlantState(self.model.after_step(body), lag.end)
+        stopped = rk4(derivative, self.stopped(state.body, start, parameters), (first, middle, last), dt)
+        return PlantState(self.model.after_step(self.turning(stopped, end, parameters)), lag.outputs[-1])
+
+    def residual_speed(self, output: PerRotor, fault: RotorFault, parameters: PlantParameters) -> Scalar:
+        """Omega of (4) in rad/s for lag outputs in N."""
+        return residual_speed(parameters.vehicle, true_rotor_speeds(parameters.vehicle, output, fault))
+
+    def stopped(self, body: Any, residual: Scalar, parameters: PlantParameters) -> Any:
+        """State of the body as it would be with its rotors stopped, Omega [rad/s] being what it is."""
+        return self.model.turned(body, rate_against_rotors(parameters.vehicle, residual))
+
+    def turning(self, stopped: Any, residual: Scalar, parameters: PlantParameters) -> Any:
+        """State of the body with its rotors turning, from that with its rotors stopped."""
+        return self.model.turned(stopped, -rate_against_rotors(parameters.vehicle, residual))
 
     def forcing(
-        self, time: Scalar, output: PerRotor, fault: RotorFault, held: Held, parameters: PlantParameters
+        self,
+        time: Scalar,
+        output: PerRotor,
+        residual: Scalar,
+        fault: RotorFault,
+        held: Held,
+        parameters: PlantParameters,
     ) -> Forcing:
         """What drives the body.
 
@@ -198,6 +222,8 @@ class Plant:
         time : scalar, s
         output : PerRotor, N
             Lag outputs.
+        residual : scalar, rad/s
+            Omega of (4).
         fault : RotorFault
             Mean over the integration step.
         held : Held
@@ -208,17 +234,17 @@ class Plant:
         vehicle = parameters.vehicle
         return Forcing(
             wrench_of(vehicle, delivered_thrust(vehicle, output, fault)),
-            residual_speed(vehicle, true_rotor_speeds(vehicle, output, fault)),
+            residual,
             self.wind.at(time, held.wind, parameters.wind),
         )
 
-    def derivative(self, body: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
-        """Time derivative of the body's state, a record of the same shape.
+    def derivative(self, stopped: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
+        """Time derivative of the body's state with its rotors stopped, a record of the same shape.
 
         Parameters
         ----------
-        body : record
-            State of the body.
+        stopped : record
+            That state.
         forcing : Forcing
             At the same time.
         command : Command
@@ -227,6 +253,7 @@ class Plant:
             Numbers of the truth.
         """
         vehicle, wrench, extra_W = parameters.vehicle, forcing.wrench, command.direct_acceleration_W
+        body = self.turning(stopped, forcing.residual_speed, parameters)
         if self.ground is not None:
             contact = self.ground.contact(self.model.observe(body), parameters.ground)
             wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)

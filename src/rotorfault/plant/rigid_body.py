@@ -58,6 +58,10 @@ class RigidBody(BodyModel[RigidBodyState]):
             omega_B=angular_acceleration(vehicle, wrench.torque_B, body.omega_B, residual_speed),
         )
 
+    def turned(self, body: RigidBodyState, rate: Scalar) -> RigidBodyState:
+        """The state with its rate about body z changed by so much [rad/s]."""
+        return body._replace(omega_B=body.omega_B + Vec3(0.0, 0.0, rate))
+
     def after_step(self, body: RigidBodyState) -> RigidBodyState:
         """Bring the quaternion back to unit length, which integration keeps only to its own order."""
         return body._replace(q_WB=body.q_WB.normalised())

@@ -16,12 +16,15 @@ that it causes exactly (:math:`z = w_0h`):
           \varphi_n = \int_0^1\frac{(1-s)^{n-1}}{(n-1)!}e^{-zs}\,ds
 
 They differ from :math:`e^{-w_0t}` by :math:`O(z^2)` in such a way that the step keeps its fourth order, and vanish as
-6/z for fast rotors, which follow at once. Source of the functions: M. Hochbruck, A. Ostermann, "Exponential
-integrators", Acta Numerica 19, 2010, section 2.
+6/z for fast rotors, which follow at once. Speeds, roots of thrusts, are taken as they are at the three times, with
+the first one changed so that their mean would be right if they decayed like thrusts (`LagStep.sag`, of order z^3).
+Source of the functions: M. Hochbruck, A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010, section 2.
 
 Readings (docs/paper.md): a loss acts *after* the lag, at once; and what is lost is thrust, not speed: a rotor with a
 loss still spins as fast as a sound one with the same lag output, so rotor speeds, and with them the gyroscopic
-torque, belong to the sound thrust k v. A stuck rotor spins at the speed that gives its fixed thrust.
+torque, belong to the sound thrust k v. A stuck rotor spins at the speed that gives its fixed thrust. That its thrust
+jumps there at once is a simplification, so the jump turns no body: what would take up its momentum, and in what time,
+is not modelled.
 """
 
 from __future__ import annotations
@@ -44,8 +47,9 @@ _SERIES = tuple((-1.0) ** j / math.factorial(j + 3) for j in range(14))
 class LagStep(NamedTuple):
     """Lag outputs over an integration step, in N."""
 
-    stages: tuple[PerRotor, PerRotor, PerRotor]  # what a Runge-Kutta step is to take for them: start, middle, end
-    end: PerRotor  # at the end of the step, exactly
+    driving: tuple[PerRotor, PerRotor, PerRotor]  # what a Runge-Kutta step is to take for them: start, middle, end
+    outputs: tuple[PerRotor, PerRotor, PerRotor]  # what they are at its start, in its middle and at its end
+    sag: Scalar  # what is to be taken off the start for the right mean of what decays likewise, as share of its fall
 
 
 def lag_step(vehicle: Vehicle, output: PerRotor, limited: PerRotor, dt: Scalar) -> LagStep:
@@ -64,11 +68,22 @@ def lag_step(vehicle: Vehicle, output: PerRotor, limited: PerRotor, dt: Scalar) 
     z = vehicle.rotor_bandwidth * dt
     gap = output - limited
     first, middle, last = (limited + gap * weight for weight in stage_weights(z))
-    return LagStep((first, middle, last), limited + gap * exp(-z))
+    half, whole = exp(-0.5 * z), exp(-z)
+    mean = _integrals(z)[0]
+    sag = (1.0 + 4.0 * half + whole - 6.0 * mean) / (z * mean)
+    return LagStep((first, middle, last), (output, limited + gap * half, limited + gap * whole), sag)
 
 
 def stage_weights(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """What stands for exp(-z s) at s = 0, 1/2 and 1 of a Runge-Kutta step, for any z > 0."""
+    phi_1, phi_2, phi_3 = _integrals(z)
+    first = 24.0 * phi_3 - 6.0 * phi_2
+    middle = 6.0 * phi_2 - 12.0 * phi_3
+    return first, middle, 6.0 * phi_1 - first - 4.0 * middle
+
+
+def _integrals(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """phi_1, phi_2 and phi_3."""
     small, large = minimum(z, _SERIES_BELOW), maximum(z, _SERIES_BELOW)
     series: Scalar = 0.0
     for coefficient in reversed(_SERIES):
@@ -81,9 +96,7 @@ def stage_weights(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     closed = (phi_1, phi_2, (0.5 - phi_2) / large)
     below = less(z, _SERIES_BELOW)
     phi_1, phi_2, phi_3 = (select(below, a, b) for a, b in zip(summed, closed, strict=True))
-    first = 24.0 * phi_3 - 6.0 * phi_2
-    middle = 6.0 * phi_2 - 12.0 * phi_3
-    return first, middle, 6.0 * phi_1 - first - 4.0 * middle
+    return phi_1, phi_2, phi_3
 
 
 def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> PerRotor:
@@ -102,7 +115,7 @@ def delivered_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> P
 
 
 def true_rotor_speeds(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
-    """Rotor speeds in rad/s, without sign, for lag outputs in N."""
+    """Rotor speeds in rad/s, negative where reversed, for lag outputs in N."""
     sound = output * vehicle.rotor_gain
     return rotor_speeds(vehicle, _held(sound, fault))
 

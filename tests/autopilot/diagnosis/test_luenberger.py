@@ -91,6 +91,7 @@ def watch(
             mean_thrust=rotors.mean,
             thrust=thrust,
             residual_speed=residual_speed(vehicle, rotor_speeds(vehicle, thrust)),
+            residual_change=0.0,
             direct_acceleration_W=zeros(),
             elapsed=T if k else 0.0,
         )

@@ -77,7 +77,7 @@ def test_in_steady_hover_a_wrong_model_is_no_excuse() -> None:
     threshold = flight.data["diagnosis.threshold"].values
     calm = 0.1 * np.maximum(flight.data["expected_thrust"].values, HOVER)
     np.testing.assert_allclose(threshold[950], calm[950], rtol=1e-3)
-    np.testing.assert_allclose(threshold[-1], calm[-1], rtol=1e-2)
+    np.testing.assert_allclose(threshold[-1], calm[-1], rtol=3e-2)
     assert threshold[1030:1100].max() > 1.2 * calm[950].max()  # while the body turns
 
 

@@ -224,13 +224,21 @@ def decide(
     small = p.test_thrust * hover
 
     def one(
-        loss: Scalar, r: Scalar, partner: Scalar, f: Scalar, any_: Scalar, beside: Scalar, was: DecisionMemory
+        loss: Scalar,
+        r: Scalar,
+        partner: Scalar,
+        at_fault: Scalar,
+        f: Scalar,
+        any_: Scalar,
+        beside: Scalar,
+        was: DecisionMemory,
     ) -> tuple[Scalar, ...]:
         off, large = sound - r, maximum(f, hover)
         base = maximum(p.threshold * large, noise)
-        # No pair is a measure while a rotor gives too much: what that does to the others is in no model.
+        # No pair is a measure while a rotor gives too much, for what that does to the others is in no model; nor is a
+        # partner at fault.
         behind, near = maximum(partner - r, 0.0), base * base + beside
-        comparable = both(greater(behind * behind, near), less(excess * excess, near))
+        comparable = both(both(greater(behind * behind, near), less(excess * excess, near)), negated(at_fault))
         threshold = sqrt(base * base + select(comparable, minimum(beside, any_), any_))
         suspected = greater(absolute(off), threshold)
         since = select(suspected, was.suspected + dt, 0.0)
@@ -258,9 +266,13 @@ def decide(
         return threshold, test, since, below, flagged, smoothed, tested
 
     before = (DecisionMemory(*values) for values in zip(*memory, strict=True))
-    r1, r2, r3, r4 = in_pairs(vehicle, evidence.residual)
-    partners = from_pairs(vehicle, PerRotor(r2, r1, r4, r3))
-    known = (evidence.residual, partners, evidence.thrust, *evidence.model_error)
+
+    def opposite(values: PerRotor) -> PerRotor:
+        r1, r2, r3, r4 = in_pairs(vehicle, values)
+        return from_pairs(vehicle, PerRotor(r2, r1, r4, r3))
+
+    partners, at_fault = opposite(evidence.residual), opposite(memory.flagged)
+    known = (evidence.residual, partners, at_fault, evidence.thrust, *evidence.model_error)
     rows = zip(losses, *known, before, strict=True)
     threshold, test, *after = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
     decided = DecisionMemory(*after)

@@ -49,6 +49,7 @@ from rotorfault.autopilot.diagnosis.model_error import (
     nothing_shown,
 )
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
@@ -193,7 +194,8 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         # At the first step nothing has elapsed: the deviations (zero) must not be carried either.
         carry = parameters.carry * memory.started
         climb = memory.climb + climb_change * elapsed + cosine * memory.delta_z * carry
-        omega_B = memory.omega_B + omega_change * elapsed + memory.delta_omega * carry
+        turned = omega_change * elapsed + reaction(inputs.expectation, vehicle)
+        omega_B = memory.omega_B + turned + memory.delta_omega * carry
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
@@ -204,7 +206,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         evidence = Evidence(
             residual,
             inputs.expectation.thrust,
-            misstated(wrong, parameters.decision.model, vehicle),
+            misstated(wrong, memory.decision.flagged, parameters.decision.model, vehicle),
             noise_of(wrong, vehicle, dynamics),
         )
         decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, elapsed)

@@ -16,6 +16,9 @@ passes through the error dynamics,
 so the same filter runs on what a share of 1 would show. In steady flight, with the torque of a lost rotor balanced,
 no body accelerates and no rotor lags: then a wrong inertia or bandwidth explains nothing, and a small loss is seen.
 
+Where rotors react on the body, a wrong bandwidth misstates their change of speed too, and with it the yaw rate; and a
+rotor that is flagged may be stuck, so that the reaction that the model lays to it never comes.
+
 A torque about the yaw axis weighs on two opposite rotors alike. So a rotor is also compared with its partner, where
 errors about yaw, which are the largest by far in a hard turn, explain nothing.
 
@@ -35,8 +38,9 @@ from rotorfault.maths.scalar import Scalar, absolute, maximum, minimum, sqrt
 from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
 from rotorfault.model.motion import limited
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds
 
+SPEED_SHARE = -0.3  # of the bandwidth, for rotor speeds: slower rotors, for there the root is steeper
 NOISE_MEMORY = 0.5  # s: long beside a fault's onset, which is no noise; short beside a change of the weather
 
 
@@ -66,6 +70,12 @@ class ModelErrorMemory(NamedTuple):
     turning: Vec3  # rad/s^2: angular acceleration, late
     product_innovation: Vec3  # rad^2/s
     product: Vec3  # rad^2/s^2: products of the rates about the two other axes, late
+    reaction: Scalar  # rad/s: sensitivity of the yaw rate to the logarithm of the bandwidth, by the rotors' reaction
+    reaction_innovation: Scalar  # rad/s
+    reacting: Scalar  # rad/s^2: its derivative, late
+    speed: PerRotor  # rad/s: as believed
+    spin_innovation: PerRotor  # rad/s
+    spinning: PerRotor  # rad/s^2: derivative of the rotors' speeds, as believed, late
     time: Scalar  # s: that the noise has been looked at, `NOISE_MEMORY` at most
     noise: Vec3  # rad^2/s^2: mean square of the innovations of the body rates
 
@@ -97,7 +107,7 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
 def nothing_shown() -> ModelErrorMemory:
     """Before the first instant."""
     none, still = PerRotor.all(0.0), zeros()
-    return ModelErrorMemory(none, none, none, still, still, still, still, 0.0, still)
+    return ModelErrorMemory(none, none, none, still, still, still, still, 0.0, 0.0, 0.0, none, none, none, 0.0, still)
 
 
 def follow(
@@ -132,6 +142,16 @@ def follow(
     turn_innovation = memory.turn_innovation * kept + turned - memory.turning * elapsed
     x, y, z = expectation.now.omega_B
     product_innovation = memory.product_innovation * kept + (Vec3(y * z, z * x, x * y) - memory.product) * elapsed
+    # A rotor that runs ahead of its model has also turned the body further the other way. Its speed is a root of its
+    # thrust, so the difference is that of a share as large as bandwidths are wrong by.
+    ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
+    ran_ahead = residual_speed(vehicle, ahead_of_model) - expectation.residual_speed
+    reaction = -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
+    reaction_innovation = memory.reaction_innovation * kept + reaction - memory.reaction - memory.reacting * elapsed
+    speed = rotor_speeds(vehicle, expectation.thrust)
+    # At the first instant, when nothing has elapsed, no speed is known from before.
+    sped = (speed - memory.speed) * minimum(elapsed * 1e9, 1.0)
+    spin_innovation = memory.spin_innovation * kept + sped - memory.spinning * elapsed
     time = minimum(memory.time + elapsed, NOISE_MEMORY)
     # The mean at first, and later with an exponential window.
     share = elapsed / maximum(time, 1e-9)
@@ -144,6 +164,12 @@ def follow(
         turning=memory.turning + turn_innovation * dynamics.gain_deviation,
         product_innovation=product_innovation,
         product=memory.product + product_innovation * dynamics.gain_deviation,
+        reaction=reaction,
+        reaction_innovation=reaction_innovation,
+        reacting=memory.reacting + reaction_innovation * dynamics.gain_deviation,
+        speed=speed,
+        spin_innovation=spin_innovation,
+        spinning=memory.spinning + spin_innovation * dynamics.gain_deviation,
         time=time,
         noise=memory.noise + (squared - memory.noise) * share,
     )
@@ -156,7 +182,7 @@ class Misstated(NamedTuple):
     partner: PerRotor  # N^2: behind the one opposite, which a torque about the yaw axis cannot tell from it
 
 
-def misstated(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Misstated:
+def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehicle: Vehicle) -> Misstated:
     """How much less thrust than another a sound rotor may seem to give by a wrong model.
 
     The errors are taken as independent, so their squares add.
@@ -164,6 +190,8 @@ def misstated(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Mis
     Parameters
     ----------
     memory : ModelErrorMemory
+    flagged : PerRotor
+        1 for a rotor that may be at fault: it may be stuck, and then turns nothing where its model changes its speed.
     shares : Shares
     vehicle : Vehicle
         As believed.
@@ -176,18 +204,22 @@ def misstated(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Mis
     roll, pitch, yaw = _unit_torques(vehicle)
     arm_12 = absolute(roll.D12) * torque.x + absolute(pitch.D12) * torque.y
     arm_34 = absolute(roll.D34) * torque.x + absolute(pitch.D34) * torque.y
-    turned = 0.5 * (arm_12 + arm_34 + absolute(yaw.S12 - yaw.S34) * torque.z)
+    about_yaw = absolute(yaw.S12 - yaw.S34)
+    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    turned = 0.5 * (arm_12 + arm_34 + about_yaw * (torque.z + inertia.z * unlike))
+    reacted = 0.5 * about_yaw * inertia.z * absolute(memory.reacting)
     least, most = memory.lagging.reduce(minimum), memory.lagging.reduce(maximum)
 
-    def square(lagging: Scalar) -> Scalar:
-        # Beside the rotor whose lag is least like its own.
-        error = shares.bandwidth * maximum(most - lagging, lagging - least)
+    def square(lagging: Scalar, reacted: Scalar) -> Scalar:
+        # Beside the rotor whose lag is least like its own; the reaction comes from the same error, so sizes add.
+        error = shares.bandwidth * (maximum(most - lagging, lagging - least) + reacted)
         return error * error
 
-    lagged = memory.lagging.map(square)
+    any_other = memory.lagging.map(lambda lagging: square(lagging, reacted) + turned * turned)
+    lagged = memory.lagging.map(lambda lagging: square(lagging, 0.0))
     first, second = arm_12 * arm_12, arm_34 * arm_34
     beside = from_pairs(vehicle, PerRotor(first, first, second, second))
-    return Misstated(lagged + turned * turned, lagged + beside)
+    return Misstated(any_other, lagged + beside)
 
 
 def noise_of(memory: ModelErrorMemory, vehicle: Vehicle, dynamics: Dynamics) -> Scalar:

@@ -118,6 +118,13 @@ def variations() -> tuple[Variation, ...]:
         V("feed-forward", "model", "acceleration fed forward", {"reference.feed_forward": True}, cases=("square",)),
         V("six-inputs", "model", "six inputs, no cascade", {"controller.cascade.six_inputs": True}),
         V("rigid", "model", "rigid-body plant", plant="rigid_body"),
+        V("reaction", "model", "rotor reaction on", {"vehicle.rotor_reaction.value": 1.0}),
+        V(
+            "reaction-iz",
+            "model",
+            "rotor reaction on, I_z 3.3e-3 kg m²",
+            {"vehicle": "paper-iz-33e-4", "vehicle.rotor_reaction.value": 1.0},
+        ),
     ]
     entries += [
         V(f"poles-{p:g}", "observer", f"poles {p:g}, {1.5 * p:g} rad/s", {"diagnosis.poles": [p, 1.5 * p]})
