@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -104,6 +106,59 @@ def test_a_damaged_file_is_replaced(compiler: Compiler, monkeypatch: pytest.Monk
         forget(monkeypatch)
         run(short(), "simd")
         assert compiler.count == count, f"{what}: was not replaced"
+
+
+def test_a_loop_that_others_could_have_planted_is_not_run(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    if not hasattr(os, "geteuid"):
+        pytest.skip("owners and modes are those of POSIX")
+    wanted = run(short(), "simd").signals
+    kept = tmp_path / "cache"
+    (file,) = kept.iterdir()
+    assert (kept.stat().st_mode & 0o777, file.stat().st_mode & 0o777) == (0o700, 0o600)
+    home = tmp_path / "home"
+    (home / ".cache").mkdir(parents=True)
+    shutil.copytree(kept, home / ".cache" / "rotorfault")
+    shutil.copytree(kept, tmp_path / "relative")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(cache, "_DOUBTS", set())
+    kept.chmod(0o777)
+    home.chmod(0o777)
+    for count, (named, why) in enumerate(
+        ((str(kept), "can be written by other users"), (None, "home can be"), ("relative", "is a relative path")), 2
+    ):
+        monkeypatch.delenv("ROTORFAULT_CACHE", raising=False)
+        if named is not None:
+            monkeypatch.setenv("ROTORFAULT_CACHE", named)
+        forget(monkeypatch)
+        with pytest.warns(cache.CacheWarning, match=f"neither read nor kept: .*{why}"):
+            np.testing.assert_array_equal(run(short(), "simd").signals, wanted)
+        assert compiler.count == count, named
+        forget(monkeypatch)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # it is said once
+            assert cache.folder() is None
+    assert all(folder.stat().st_mode & 0o777 == 0o777 for folder in (kept, home))
+
+    kept.chmod(0o700)
+    file.chmod(0o646)
+    monkeypatch.setenv("ROTORFAULT_CACHE", str(kept))
+    forget(monkeypatch)
+    run(short(), "simd")
+    assert compiler.count == 5, "a file that others can write"
+    assert file.stat().st_mode & 0o777 == 0o600, "was not replaced"
+
+
+def test_a_loop_counts_under_its_own_name_only(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    run(short(), "simd")
+    (file,) = (tmp_path / "cache").iterdir()
+    assert cache._load(file) is not None
+    assert cache._load(file.rename(file.with_name("0" * 64 + ".loop"))) is None
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.private import NotPrivateError, cache_folder, private_folder
 from rotorfault.base.progress import Say
 
 SCRIPTS: Final = Path(__file__).parent / "peer_scripts"
@@ -243,12 +244,20 @@ def _stamp(folder: Path) -> Any:
 
 
 def _cache() -> Path:
-    folder = os.environ.get("ROTORFAULT_CACHE")
-    if folder == "":
-        raise InputError("needs a cache folder to install into, but ROTORFAULT_CACHE is empty; unset it or name one")
-    if folder is None:
-        folder = str(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rotorfault")
-    return Path(folder).expanduser().absolute() / "peers"
+    try:
+        folder = cache_folder()
+        if folder is None:
+            raise InputError(
+                "needs a cache folder to install into, but ROTORFAULT_CACHE is empty; unset it or name one"
+            )
+        # What is installed there is run: nobody else may have put it there.
+        return private_folder(folder / "peers")
+    except NotPrivateError as doubt:
+        raise InputError(f"nothing can be installed: {doubt} with ROTORFAULT_CACHE") from None
+    except OSError as error:
+        raise InputError(
+            f"{folder}: cannot be written ({error.strerror}); name another folder with ROTORFAULT_CACHE"
+        ) from None
 
 
 def _clean(cores: int) -> dict[str, str]:

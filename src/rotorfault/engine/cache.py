@@ -5,8 +5,10 @@ processor, and the structure of the loop (classes and settings of its parts). Of
 nobody knows what it depends on: a loop with one is traced anew each time, and its key is the program itself.
 
 On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
-off). A file begins with the SHA-256 of the rest, for damaged code would be loaded without complaint; one that is
-damaged or cannot be read is compiled anew and replaced.
+off). What lies there is run, so only files count that nobody else can have written (`rotorfault.base.private`): the
+folder, those above it and each file are looked at whenever one is opened, and where others could have written,
+nothing is read or kept, which is said once. A file begins with the SHA-256 of its name and the rest: damaged code would be
+loaded without complaint. One that is damaged or cannot be read is compiled anew and replaced.
 """
 
 from __future__ import annotations
@@ -14,11 +16,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rotorfault.base.files import write_atomically
+from rotorfault.base.private import NotPrivateError, cache_folder, private_folder, read_private, write_private
 from rotorfault.base.versions import source_digest
 from rotorfault.engine.program import Layout
 from rotorfault.engine.structure import foreign, structure
@@ -76,15 +79,33 @@ def get(name: str, make: Callable[[], Compiled]) -> Compiled:
     return _KEPT[name]
 
 
+class CacheWarning(UserWarning):
+    """Compiled loops are not kept, because somebody else could have written where they lie."""
+
+
+_DOUBTS: set[str] = set()  # that have been told
+
+
 def folder() -> Path | None:
-    """Where compiled loops lie; None where the user wants none."""
-    named = os.environ.get("ROTORFAULT_CACHE")
-    if named == "":
+    """Where compiled loops lie; None where the user wants none, or where somebody else could have put some.
+
+    Warns (`CacheWarning`) of the latter, once.
+    """
+    try:
+        place = cache_folder()
+        return None if place is None else private_folder(place)
+    except OSError:
+        return None  # a cache that cannot be made costs a second next time, nothing else
+    except NotPrivateError as doubt:
+        _tell(str(doubt))
         return None
-    if named is not None:
-        return Path(named)
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "rotorfault"
+
+
+def _tell(doubt: str) -> None:
+    if doubt not in _DOUBTS:
+        _DOUBTS.add(doubt)
+        text = f"compiled loops are neither read nor kept: {doubt} with ROTORFAULT_CACHE (empty for none)"
+        warnings.warn(text, CacheWarning, stacklevel=2)
 
 
 def _path(name: str) -> Path | None:
@@ -94,25 +115,30 @@ def _path(name: str) -> Path | None:
 
 def _prune(place: Path) -> None:
     """Keep the newest compiled loops only: every change of the package leaves old ones behind."""
-    old = sorted(place.glob("*.loop"), key=lambda file: file.stat().st_mtime)[: -KEEP + 1]
+    old = sorted(place.glob("*.loop"), key=lambda file: file.lstat().st_mtime)[: -KEEP + 1]
     for file in old:
         file.unlink(missing_ok=True)
+
+
+def _sum(name: str, made: bytes) -> bytes:
+    # With the name, so that no file counts under that of another loop.
+    return hashlib.sha256(name.encode() + b"\n" + made).digest()
 
 
 def _load(path: Path | None) -> Compiled | None:
     if path is None:
         return None
     try:
-        content = path.read_bytes()
+        content = read_private(path)
         sum_, made = content[:_SUM_LENGTH], content[_SUM_LENGTH:]
-        if hashlib.sha256(made).digest() != sum_:
+        if _sum(path.stem, made) != sum_:
             return None
         os.utime(path)  # what is used stays: the oldest are removed
         head, _, code = made.partition(b"\n")
         about: dict[str, Any] = json.loads(head)
         return Compiled(code, Layout(**about["layout"]), about["operations"])
     except Exception:
-        # Missing, or of another version: whatever it is, the loop can be compiled anew.
+        # Missing, of another version, or another user's: whatever it is, the loop can be compiled anew.
         return None
 
 
@@ -121,10 +147,8 @@ def _store(path: Path | None, made: Compiled) -> None:
         return
     head = json.dumps({"layout": made.layout._asdict(), "operations": made.operations}).encode()
     content = head + b"\n" + made.code
-    content = hashlib.sha256(content).digest() + content
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         _prune(path.parent)
-        write_atomically(path, lambda temporary: temporary.write_bytes(content))
+        write_private(path, _sum(path.stem, content) + content)
     except OSError:
         return  # a cache that cannot be written costs a second next time, nothing else
