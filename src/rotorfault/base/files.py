@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import secrets
+import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rotorfault.base.errors import InputError
+
+if os.name != "nt":
+    import fcntl
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
@@ -28,19 +34,26 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     OSError
         If the folder cannot be written; nothing is left behind.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
+    # In a folder that only the user may enter, under a name that nobody can guess: whoever may write into the folder
+    # of results cannot lay a link where the file will be written.
+    private = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name[:40]}."))
+    temporary = private / f"{secrets.token_hex(8)}{path.suffix}"
     try:
         write(temporary)
-        # mkstemp makes files that only their owner may read; results are meant to be shared.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
+        _share(temporary)
         temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            private.rmdir()
+
+
+def _share(path: Path) -> None:
+    """What any other file would have: results are meant to be shared."""
+    mask = os.umask(0)
+    os.umask(mask)
+    path.chmod(0o666 & ~mask)
 
 
 def write_durably(path: Path, content: bytes) -> None:
@@ -51,7 +64,7 @@ def write_durably(path: Path, content: bytes) -> None:
     OSError
         If it cannot be written; what was there before is still there, and nothing else.
     """
-    # No pattern for finished files, such as *.parquet, may find it.
+    # No pattern for finished files, such as *.parquet, may find it; nor does it follow a link that lies there.
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:
@@ -113,3 +126,37 @@ def output_folder(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder with --out") from None
     return path
+
+
+def read_plain(path: Path) -> bytes:
+    """The content of a plain file; a pipe would be waited for, and a device may never end.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is no plain file.
+    """
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "is a folder" if path.is_dir() else "is no plain file", str(path))
+    with os.fdopen(handle, "rb") as file:
+        return file.read()
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Wait until nobody else writes a set of files into a folder, then keep others waiting.
+
+    Files that belong together must be of one flight. Where the system has no such locks nobody waits.
+    """
+    if os.name == "nt":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # such as on a network's disk
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)

@@ -7,8 +7,8 @@ nobody knows what it depends on: a loop with one is traced anew each time, and i
 On disk a compiled loop lies in the user's cache folder (``ROTORFAULT_CACHE`` names another one; empty turns it
 off). What lies there is run, so only files count that nobody else can have written (`rotorfault.base.private`): the
 folder, those above it and each file are looked at whenever one is opened, and where others could have written,
-nothing is read or kept, which is said once. A file begins with the SHA-256 of its name and the rest: damaged code would be
-loaded without complaint. One that is damaged or cannot be read is compiled anew and replaced.
+nothing is read or kept, which is said once. A file begins with the SHA-256 of its name and the rest: damaged code
+would be loaded without complaint. One that is damaged or cannot be read is compiled anew and replaced.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-from rotorfault.base.files import output_folder, write_atomically
+from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.results.export import write_csv
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
@@ -143,12 +143,14 @@ class Flight:
         """
         folder = output_folder(Path(folder))
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
-        written = [self.save(folder / "flight.nc"), folder / "summary.json"]
-        write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
-        if with_figures:
-            from rotorfault.report import figures
+        # Another flight into the same folder waits: its files must not mix with these.
+        with alone_in(folder):
+            written = [self.save(folder / "flight.nc"), folder / "summary.json"]
+            write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            if with_figures:
+                from rotorfault.report import figures
 
-            written += figures.save(self.plot(), folder)
+                written += figures.save(self.plot(), folder)
         return written
 
 

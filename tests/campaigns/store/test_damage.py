@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Callable
@@ -64,6 +65,21 @@ def folder_instead(path: Path) -> None:
     path.mkdir()
 
 
+def link_to_nothing(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("nothing")
+
+
+def link_to_itself(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+def pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
 DAMAGE: list[tuple[Callable[[Path], object], str]] = [
     (cut, "is cut short"),
     (lambda path: path.write_bytes(b""), "is empty"),
@@ -75,6 +91,9 @@ DAMAGE: list[tuple[Callable[[Path], object], str]] = [
     (of_another_campaign, "belongs to another campaign"),
     (copy_over, "holds round 0, block 3: copied or renamed"),
     (folder_instead, "is a folder"),
+    (link_to_nothing, r"is a link to what cannot be read \(No such file"),
+    (link_to_itself, r"is a link to what cannot be read \(Too many levels"),
+    (pipe, "is no plain file"),
 ]
 
 
@@ -96,7 +115,17 @@ def test_damage_is_named_and_repaired(damage: Callable[[Path], object], words: s
         assert missing(store, BLOCKS) == [(0, 2)]
         store.put(0, 2, results(0, 2))
         assert content_digest(store.table()) == content_digest(undisturbed())
-    assert (folder / "damaged" / "round-000-block-00002.parquet").exists()
+    assert os.path.lexists(folder / "damaged" / "round-000-block-00002.parquet")
+
+
+def test_links_moved_aside_do_not_take_each_others_place(folder: Path) -> None:
+    for target in ("nothing", "nowhere"):
+        link = part(folder)
+        link.unlink()
+        link.symlink_to(target)
+        with Store.open(folder, repair=True) as store:
+            store.put(0, 2, results(0, 2))
+    assert {os.readlink(path) for path in (folder / "damaged").iterdir()} == {"nothing", "nowhere"}
 
 
 @pytest.mark.parametrize("name", ["copy.parquet", "round-0-block-2.parquet", "round-0000-block-00002.parquet"])

@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -89,3 +89,55 @@ def test_a_disk_without_locks_is_said(folder: Path, monkeypatch: pytest.MonkeyPa
         InputError, match=r"lock: cannot be locked \(No locks available\); give an --out on a disk of"
     ):
         Store.open(folder, write=True)
+
+
+def lay_link(lock: Path, precious: Path) -> None:
+    lock.symlink_to(precious)
+
+
+def lay_second_name(lock: Path, precious: Path) -> None:
+    os.link(precious, lock)
+
+
+def lay_file(lock: Path, precious: Path) -> None:
+    lock.write_bytes(precious.read_bytes())
+
+
+def lay_folder(lock: Path, precious: Path) -> None:
+    lock.mkdir()
+
+
+def lay_pipe(lock: Path, precious: Path) -> None:
+    os.mkfifo(lock)
+
+
+@pytest.mark.parametrize(
+    ("lay", "words"),
+    [
+        (lay_link, "is a link, and what it leads to would be emptied; remove it"),
+        (lay_second_name, "has another name elsewhere; remove it"),
+        (lay_file, "holds something else than a lock; move it away"),
+        (lay_folder, r"cannot be written \(Is a directory\)"),
+        (lay_pipe, "is no plain file; remove it"),
+    ],
+)
+def test_nothing_that_lies_in_the_place_of_a_lock_is_emptied(
+    lay: Callable[[Path, Path], None], words: str, folder: Path, tmp_path: Path
+) -> None:
+    precious = tmp_path / "thesis.txt"
+    precious.write_text("years of work")
+    (folder / "lock").unlink(missing_ok=True)
+    lay(folder / "lock", precious)
+    with pytest.raises(InputError, match=f"lock: {words}"):
+        Store.open(folder, write=True)
+    assert precious.read_text() == "years of work"
+    if lay is lay_file:
+        assert (folder / "lock").read_text() == "years of work"
+
+
+def test_a_lock_that_a_killed_process_left_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "lock").write_text(f"process {10**9} on a very long name of a computer")
+    lock = Lock(tmp_path / "lock")
+    assert (tmp_path / "lock").read_text().startswith(f"process {os.getpid()} on ")
+    lock.release()
+    assert (tmp_path / "lock").read_text() == ""

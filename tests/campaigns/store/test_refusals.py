@@ -106,13 +106,35 @@ def test_a_read_only_disk(folder: Path, tmp_path: Path, monkeypatch: pytest.Monk
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    monkeypatch.setattr(os, "open", refuse)
+    opened = os.open
+
+    def read_only(path: str | Path, flags: int, *more: int) -> int:
+        if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+            refuse()
+        return opened(path, flags, *more)
+
+    monkeypatch.setattr(os, "open", read_only)
     with pytest.raises(InputError, match=r"lock: cannot be written \(Read-only file system\)"):
         Store.open(folder, write=True)
     assert content_digest(Store.open(folder).table()) == content_digest(undisturbed())
     monkeypatch.setattr(Path, "mkdir", refuse)
     with pytest.raises(InputError, match=r"new: cannot be written \(Read-only file system\); give another --out"):
         start(tmp_path / "new")
+
+
+def test_parts_that_cannot_be_listed_are_not_taken_for_none(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = os.listdir
+
+    def refuse(path: str | Path) -> list[str]:
+        if Path(path).name == "parts":
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return listed(path)
+
+    reader = Store.open(folder)
+    monkeypatch.setattr(os, "listdir", refuse)
+    for use in (reader.done, reader.table, lambda: Store.open(folder, write=True)):
+        with pytest.raises(InputError, match=r"parts: cannot be read \(Permission denied\); fix its permissions"):
+            use()
 
 
 def test_too_little_space_is_said_before_anything_is_flown(tmp_path: Path) -> None:

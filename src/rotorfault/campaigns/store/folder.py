@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.files import is_leftover, write_durably
+from rotorfault.base.files import is_leftover, read_plain, write_durably
 from rotorfault.campaigns.store.identity import Identity, read_identity
+from rotorfault.campaigns.store.parquet import DamagedError
 
 STUDY, PARTS, DAMAGED, LOCK, FLIGHTS = "study.json", "parts", "damaged", "lock", "flights.parquet"
 
@@ -77,6 +79,45 @@ def _size(count: int) -> str:
     return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.1f} MB"
 
 
+def parts_in(folder: Path) -> list[Path]:
+    """All Parquet files among a campaign's parts, whatever their names, in order.
+
+    Raises
+    ------
+    InputError
+        If they cannot be listed: that is not the same as that there are none.
+    """
+    try:
+        names = os.listdir(folder / PARTS)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise InputError(
+            f"{folder / PARTS}: cannot be read ({error.strerror}); fix its permissions, or restore it from a copy"
+        ) from None
+    return sorted(folder / PARTS / name for name in names if name.endswith(".parquet"))
+
+
+def part_content(path: Path) -> bytes:
+    """The bytes of a part.
+
+    Raises
+    ------
+    DamagedError
+        If what is there is no file, or a link to none: a repair moves it aside.
+    InputError
+        If it cannot be read for another reason, which a repair does not mend.
+    """
+    try:
+        return read_plain(path)
+    except OSError as error:
+        if path.is_dir() or (path.exists() and not path.is_file()):
+            raise DamagedError("is a folder" if path.is_dir() else "is no plain file") from None
+        if path.is_symlink():
+            raise DamagedError(f"is a link to what cannot be read ({error.strerror})") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}); fix its permissions and retry") from None
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove the unfinished files of a killed run; only for the holder of the lock."""
     for path in [*folder.glob(".*.tmp"), *(folder / PARTS).glob(".*.tmp")]:
@@ -89,7 +130,7 @@ def move_aside(folder: Path, name: str) -> None:
     place = folder / DAMAGED
     place.mkdir(exist_ok=True)
     target, number = place / name, 1
-    while target.exists():
+    while os.path.lexists(target):  # a link to nothing is there too
         target, number = place / f"{name}.{number}", number + 1
     (folder / PARTS / name).rename(target)
 

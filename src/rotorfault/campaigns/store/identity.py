@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.files import read_plain
 from rotorfault.base.versions import versions
 
 FORMAT = 2  # of the folder
@@ -110,7 +111,7 @@ def read_identity(path: Path) -> Identity:
         If it cannot be read, is damaged, or was written by a later version.
     """
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(read_plain(path))
         file_format = content["format"]
         if isinstance(file_format, int) and file_format > FORMAT:
             version = content["versions"]["rotorfault"]
@@ -132,7 +133,7 @@ def read_identity(path: Path) -> Identity:
         raise InputError(f"{path}: cannot be read ({error.strerror}); fix its permissions and retry") from None
     except InputError:
         raise
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(f"{path}: is damaged or was not written by rotorfault; {_REMEDY}") from None
     return campaign
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 import errno
 import os
 import platform
+import re
+import stat
 import sys
 import weakref
 from pathlib import Path
@@ -42,12 +44,7 @@ class Lock:
 
     def __init__(self, path: Path) -> None:
         self._handle: int | None = None
-        try:
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise InputError(
-                f"{path}: cannot be written ({error.strerror}); fix its permissions or give another --out"
-            ) from None
+        handle = _opened(path)
         try:
             _take(handle)
         except OSError as error:
@@ -60,7 +57,11 @@ class Lock:
             raise InputError(
                 f"{path}: cannot be locked ({error.strerror}); give an --out on a disk of this computer"
             ) from None
+        if not re.fullmatch(r"(process \d+ on .*)?", _text(handle)):
+            os.close(handle)
+            raise InputError(f"{path}: holds something else than a lock; move it away or give another --out")
         os.ftruncate(handle, 0)
+        os.lseek(handle, 0, os.SEEK_SET)
         os.write(handle, f"process {os.getpid()} on {platform.node()}".encode())
         self._handle = handle
         _OPEN.add(self)
@@ -98,6 +99,26 @@ def _forget_all() -> None:
 # A forked worker shares its parent's lock, and would hold it after the parent was killed.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget_all)
+
+
+def _opened(path: Path) -> int:
+    """The file of a lock, made if it is not there; only a plain file that has no other name, for it is emptied."""
+    plain = "remove it or give another --out"
+    try:
+        flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | flags, 0o666)
+    except OSError as error:
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link, and what it leads to would be emptied; {plain}") from None
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror}); fix its permissions or give another --out"
+        ) from None
+    about = os.fstat(handle)
+    if not stat.S_ISREG(about.st_mode) or about.st_nlink != 1:
+        os.close(handle)
+        what = "has another name elsewhere" if stat.S_ISREG(about.st_mode) else "is no plain file"
+        raise InputError(f"{path}: {what}; {plain}")
+    return handle
 
 
 def _take(handle: int) -> None:

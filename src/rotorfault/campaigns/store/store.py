@@ -17,6 +17,7 @@ once.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Container, Iterable
 from pathlib import Path
@@ -33,6 +34,8 @@ from rotorfault.campaigns.store.folder import (
     PARTS,
     STUDY,
     move_aside,
+    part_content,
+    parts_in,
     remove_leftovers,
     require_space,
     require_vacant,
@@ -195,7 +198,7 @@ class Store:
         path = self.path(round, block)
         if self._schema is not None and table.schema != self._schema:
             raise ValueError(f"columns differ from those of the other blocks: {_unlike(table.schema, self._schema)}")
-        if path.exists():
+        if os.path.lexists(path):
             if content_digest(self.get(round, block)) != content_digest(table):
                 raise InputError(f"{path}: is there already with other results; start anew with another --out")
             return
@@ -211,7 +214,7 @@ class Store:
             If they are not there, or damaged.
         """
         path = self.path(round, block)
-        if not path.exists():
+        if not os.path.lexists(path):
             raise InputError(f"{path}: is not flown yet; complete the campaign with --resume")
         try:
             return self._part((round, block))
@@ -314,7 +317,7 @@ class Store:
         """Sound blocks with their tables, and parts that are not sound; None for blocks that need not be read."""
         sound: dict[Key, pa.Table | None] = {}
         damages = []
-        for path in sorted((self.folder / PARTS).glob("*.parquet")):
+        for path in parts_in(self.folder):
             key = _key(path.name)
             if key is None or path != self.path(*key):
                 damages.append(Damage(path.name, "is no name of a part (round-RRR-block-BBBBB.parquet)"))
@@ -336,13 +339,7 @@ class Store:
 
     def _read(self, key: Key) -> pa.Table:
         path = self.path(*key)
-        try:
-            content = path.read_bytes()
-        except IsADirectoryError:
-            raise DamagedError("is a folder") from None
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror}); fix its permissions and retry") from None
-        about, table = decode(content)
+        about, table = decode(part_content(path))
         if about.get("campaign") != self.identity.campaign:
             raise DamagedError("belongs to another campaign")
         if (about.get(_ROUND), about.get(_BLOCK)) != key:
