@@ -18,6 +18,7 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 from rotorfault.base.errors import InputError, choices, nearest
 from rotorfault.base.number_rule import OWN, short, strict
 from rotorfault.base.number_rule import refusal as refusal
+from rotorfault.base.plain_text import printable
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -55,7 +56,16 @@ class Strict(BaseModel):
             for key in data:
                 if key not in allowed and key not in cls.model_fields:
                     raise refusal(str(key), f"unknown key{nearest(key, allowed)} ({choices(allowed)})")
+                _require_plain(str(key), data[key])
         return data
+
+
+def _require_plain(key: str, value: Any) -> None:
+    """Refuse a text that a terminal would obey, or that would look like several lines where it is printed."""
+    kept = "\n\t" if key == "description" else ""
+    for text in value if isinstance(value, (list, tuple)) else (value,):
+        if isinstance(text, str) and printable(text, kept) != text:
+            raise refusal(key, f"got {short(text)}; allowed: a text in one line, without control characters")
 
 
 def explain(error: ValidationError, where: str, data: Any = None, keys: bool = False) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from rotorfault.base.plain_text import one_line
+
 # Share of letters that two names have in common, in their order, from which one may be meant for the other. Our
 # choice: one letter exchanged in a name of three is as much, names that merely share letters have less.
 ALIKE = 0.66
@@ -15,8 +17,12 @@ class InputError(ValueError):
     """Something that the user gave cannot be used.
 
     The message says what came, what is allowed and how to mend it, with file and key where there are any. The
-    command line prints it alone and exits with code 2.
+    command line prints it alone and exits with code 2. It is one line: what a terminal would obey is written out,
+    for a message quotes what came.
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(str(message)))
 
 
 class MissingExtraError(InputError):

@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.executors import executor_of
+from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import differences, replay
 from rotorfault.campaigns.report.maps import Maps, maps
@@ -164,7 +165,7 @@ def campaign(
     else:
         raise InputError(f"study: got {study!r}; allowed: a name, a path, tables or a Study")
     checked = changed(checked, vehicle, preset, seed, budget).resolved()
-    folder = Path("campaigns") / checked.name if out is None else Path(out)
+    folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)
     executor = executor_of(workers, scheduler)
     with run.open_store(checked, folder, resume, repair) as store:

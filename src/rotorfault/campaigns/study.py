@@ -115,7 +115,10 @@ class Study(Strict):
     """Everything that defines a campaign."""
 
     name: str = Field(
-        min_length=1, pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]*$", description="short name, also of the folder"
+        min_length=1,
+        pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$",
+        max_length=100,
+        description="short name, also of the folder",
     )
     description: str = Field(default="", description="one line")
     scenario: str | dict[str, Any] = Field(

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -129,7 +130,7 @@ def padded(low: float, high: float, share: float = 0.06) -> tuple[float, float]:
 
 def shown(label: str, most: int = 60) -> str:
     """A label cut in its middle when it is too long for a legend, and safe from mathematical markup."""
-    label = " ".join(label.split()) or "flight"
+    label = one_line(" ".join(label.split())) or "flight"
     half = most // 2
     cut = label if len(label) <= most else f"{label[: half - 1]} … {label[-half + 2 :]}"
     # matplotlib leaves out of legends whatever begins with an underscore.

@@ -5,6 +5,7 @@ Every cell carries what a reader may ask of it, and how to replay one of its fli
 
 from __future__ import annotations
 
+import html
 import math
 import shlex
 from collections.abc import Sequence
@@ -43,9 +44,10 @@ class CellNote(NamedTuple):
     commands: tuple[str, ...]
     about: str  # what the commands replay
 
-    def as_data(self) -> list[str]:
-        """As data of a point of a chart."""
-        return [self.where, "<br>".join(self.lines), "\n".join(self.commands), self.about]
+    def as_data(self) -> list[str | list[str]]:
+        """As data of a point of a chart, which shows the first two as markup."""
+        lines = "<br>".join(map(_as_text, self.lines))
+        return [_as_text(self.where), lines, list(self.commands), self.about, self.where]
 
 
 def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
@@ -64,7 +66,7 @@ def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
     for at in np.ndindex(*cell.shape):
         number = max(int(pairing.first_apart[at]), 0)
         commands = tuple(
-            _command(folder, f"--cell {cell[at]} --variant {shlex.quote(name)} --number {number}")
+            _command(folder, f"--cell {cell[at]} {_variant(name)} --number {number}")
             for name in (pairing.first, pairing.second)
         )
         apart = (
@@ -183,12 +185,18 @@ def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tup
     if failures:
         command = _command(folder, f"--flight {variant.first_failure[at]}")
         return (command,), f"the first of {failures} flights that failed"
-    command = _command(folder, f"--cell {variant.cell[at]} --variant {shlex.quote(variant.label)}")
+    command = _command(folder, f"--cell {variant.cell[at]} {_variant(variant.label)}")
     return (command,), "the first flight; none failed" if variant.flights[at] else "the flight that would be first"
 
 
 def _command(folder: Path, options: str) -> str:
-    return f"rotorfault replay {shlex.quote(str(folder))} {options}"
+    place = str(folder)
+    # Else it would be read as an option.
+    return f"rotorfault replay {shlex.quote(f'./{place}' if place.startswith('-') else place)} {options}"
+
+
+def _variant(label: str) -> str:
+    return f"--variant={shlex.quote(label)}" if label.startswith("-") else f"--variant {shlex.quote(label)}"
 
 
 def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
@@ -337,11 +345,16 @@ def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | 
     }
 
 
+def _as_text(text: str) -> str:
+    """A text as plotly shows it as it is: it takes some markup, and a name from a file is none."""
+    return html.escape(text, quote=False)
+
+
 def _axis(view: View) -> Spec:
     edges = borders(view)
     axis: Spec = {
-        "title": {"text": label(view)}, "zeroline": False, "showgrid": False, "ticks": "outside",
+        "title": {"text": _as_text(label(view))}, "zeroline": False, "showgrid": False, "ticks": "outside",
         "range": [float(edges[0]), float(edges[-1])],
     }  # fmt: skip
     at, texts = ticks(view)
-    return axis | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": texts}
+    return axis | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": [_as_text(text) for text in texts]}

@@ -5,7 +5,9 @@ With two axes the success rate is a map, with one a line, with more a map for ea
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Collection
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
@@ -55,11 +57,11 @@ def _maps(maps: Maps) -> dict[str, Figure]:
         if pairs:
             figures["difference"] = difference_maps(maps, [panel for each in pairs for panel in each])
         return figures
-    figures = {}
+    figures: dict[str, Figure] = {}
     for variant, panels in zip(maps.variants, variants, strict=True):
-        figures[f"success-{_file(variant.label)}"] = success_maps(maps, panels, variant.label)
+        figures[_free(f"success-{_file(variant.label)}", figures)] = success_maps(maps, panels, variant.label)
     for pair, panels in zip(maps.pairings, pairs, strict=True):
-        name = f"difference-{_file(pair.first)}-{_file(pair.second)}"
+        name = _free(f"difference-{_file(pair.first)}-{_file(pair.second)}", figures)
         figures[name] = difference_maps(maps, panels, f"{pair.first} less {pair.second}")
     return figures
 
@@ -67,6 +69,12 @@ def _maps(maps: Maps) -> dict[str, Figure]:
 def _less(first: str, second: str) -> str:
     """Title of a difference, on two lines where it is long."""
     return f"{first} less {second}" if len(first + second) < 24 else f"{first}\nless {second}"
+
+
+def _free(name: str, taken: Collection[str]) -> str:
+    """A name, with a number where labels that differ have the same name as files."""
+    names = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(one for one in names if one not in taken)
 
 
 def _file(label: str) -> str:
