@@ -20,6 +20,7 @@ XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"
 OPTIONAL = "need not be installed"
 LAZY = {
+    "rotorfault.__main__": {"rotorfault.cli.main": "Ctrl-C while it loads ends the program at once"},
     "rotorfault.base.executors": {"rotorfault.base.dask_executor": OPTIONAL},
     "rotorfault.base.progress": {
         "rich.console": "most computations are done before a bar is shown",

@@ -62,10 +62,14 @@ class Strict(BaseModel):
 
 def _require_plain(key: str, value: Any) -> None:
     """Refuse a text that a terminal would obey, or that would look like several lines where it is printed."""
-    kept = "\n\t" if key == "description" else ""
+    if key == "text":
+        return  # the content of a file
+    # Names stand in lines of ours, whatever else may have several.
+    kept = "" if key in ("name", "label", "kind", "preset", "vehicle", "scenario", "file", "function") else "\r\n\t"
     for text in value if isinstance(value, (list, tuple)) else (value,):
         if isinstance(text, str) and printable(text, kept) != text:
-            raise refusal(key, f"got {short(text)}; allowed: a text in one line, without control characters")
+            one = "" if kept else ", in one line"
+            raise refusal(key, f"got {short(text)}; allowed: a text without control characters{one}")
 
 
 def explain(error: ValidationError, where: str, data: Any = None, keys: bool = False) -> str:

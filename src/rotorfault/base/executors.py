@@ -8,9 +8,10 @@ import signal
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from typing import Any, final
 
+from rotorfault.base import interrupts
 from rotorfault.base.errors import InputError
 from rotorfault.base.resumable import Executor, InputT, KeyT, ResultT, Task
 
@@ -69,7 +70,10 @@ class Processes:
         with ProcessPoolExecutor(
             workers, mp_context=get_context("spawn"), initializer=_start, initargs=(work,)
         ) as pool:
-            futures = {pool.submit(_call, task.input): task.key for task in tasks}
+            # That process of Python's own would let Ctrl-C through again if it were started within.
+            resource_tracker.ensure_running()
+            with interrupts.held_back():
+                futures = {pool.submit(_call, task.input): task.key for task in tasks}
             try:
                 for future in as_completed(futures):
                     yield futures[future], future.result()

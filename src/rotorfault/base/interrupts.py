@@ -1,9 +1,9 @@
 """Ctrl-C that cannot get lost.
 
-Python raises `KeyboardInterrupt` wherever it happens to be. Where that is a finalizer or a function that C code calls,
-nobody can catch it: Python prints it and goes on as if nothing had been. And a library that is being loaded may take it
-for a failure of its own. So the command line remembers that Ctrl-C came, raises it anew where it was dropped, and asks
-in long computations and at its end.
+Python raises `KeyboardInterrupt` wherever it happens to be. Where that is a finalizer or a function that C code
+calls, nobody can catch it: Python prints it and goes on as if nothing had been. And a library that is being loaded
+may take it for a failure of its own. So the command line remembers that Ctrl-C came, raises it anew where it was
+dropped, and asks in long computations and at its end.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import _thread
 import signal
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -23,24 +25,49 @@ AGAIN = 0.02  # s after which a dropped interrupt is raised anew: by then its fi
 _came = threading.Event()
 
 
-def install() -> None:
-    """Watch for Ctrl-C, in the main thread of a program; nothing where it is to be ignored, as after ``nohup``."""
-    if threading.current_thread() is not threading.main_thread():
+@contextmanager
+def watched() -> Iterator[None]:
+    """Watch for Ctrl-C in the main thread of a program; not where it is to be ignored, as after ``nohup``."""
+    _came.clear()
+    before, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    if threading.current_thread() is not threading.main_thread() or before is signal.SIG_IGN:
+        yield
         return
-    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, _raise)
-        sys.unraisablehook = _again
+    signal.signal(signal.SIGINT, _raise)
+    sys.unraisablehook = _again
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        sys.unraisablehook = hook
+        _came.clear()
 
 
 def came() -> bool:
-    """Whether Ctrl-C has come since `install`."""
+    """Whether Ctrl-C has come while somebody watches."""
     return _came.is_set()
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt if Ctrl-C has come and got lost."""
+    """Raise KeyboardInterrupt if Ctrl-C has come, and may have been dropped."""
     if _came.is_set():
         raise KeyboardInterrupt
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Let no Ctrl-C come, and none to the processes that are started meanwhile; one that came is raised at the end.
+
+    A process that is starting cannot yet say what Ctrl-C means to it, and would print where it was.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:

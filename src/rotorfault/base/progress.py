@@ -8,6 +8,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from rotorfault.base import interrupts
+from rotorfault.base.plain_text import one_line
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
@@ -36,7 +39,7 @@ class Bar:
         self._progress: Progress | None = None
         self._task: TaskID | None = None
         self._start = time.monotonic()
-        self.title, self.total, self.unit = title, total, unit
+        self.title, self.total, self.unit = one_line(title), total, unit
 
     def __enter__(self) -> Bar:
         global _outermost
@@ -53,7 +56,14 @@ class Bar:
             self._progress.stop()
 
     def update(self, done: float, note: str = "") -> None:
-        """Show how much is done, in `unit`, how fast, and a note."""
+        """Show how much is done, in `unit`, how fast, and a note.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If Ctrl-C came and was dropped somewhere: all long computations come by here.
+        """
+        interrupts.check()
         elapsed = time.monotonic() - self._start
         if self._progress is None or self._task is None:
             if elapsed < PATIENCE or _outermost is not self or not sys.stderr.isatty():
@@ -71,12 +81,12 @@ def _progress(unit: str) -> Progress:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}"),
-        TextColumn("{task.fields[rate]}"),
+        TextColumn(f"{{task.completed:.4g}} of {{task.total:.4g}} {unit}", markup=False),
+        TextColumn("{task.fields[rate]}", markup=False),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
         console=Console(stderr=True),
         transient=True,
     )

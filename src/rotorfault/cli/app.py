@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorfault._version import __version__
+from rotorfault.base.plain_text import printable
 
 if TYPE_CHECKING:
     from rotorfault.flight.flight import Flight
@@ -31,6 +32,30 @@ Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override a key, e.g. fault.0.loss=0.4; may be repeated."),
 ]
+
+
+STOPPED: list[str] = []
+"""What a command has said of the Ctrl-C that ended it; `main` says it where no command did."""
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print a text, with all that a terminal would obey written out: names in it may come from anywhere.
+
+    Parameters
+    ----------
+    text : str
+        Of one line or several.
+    err : bool
+        Whether on the error stream.
+    """
+    typer.echo(printable(text, keep="\n\t"), err=err)
+
+
+def stopped(line: str) -> typer.Exit:
+    """The exception with which a command ends after Ctrl-C, when it has said what becomes of its work."""
+    STOPPED.append(line)
+    say(line, err=True)
+    return typer.Exit(130)
 
 
 def _version(wanted: bool) -> None:
@@ -59,8 +84,8 @@ def finish(flight: Flight, folder: Path, figures: bool) -> None:
     figures : bool
         Whether figures are drawn.
     """
-    typer.echo(str(flight.summary()))
+    say(str(flight.summary()))
     written = flight.write(folder, with_figures=figures)
-    typer.echo(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+    say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
     if flight.outcome.kind == "interrupted":
-        raise typer.Exit(130)
+        raise stopped(f"interrupted; {folder} holds the flight up to {flight.outcome.time:g} s")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rotorfault.base.errors import InputError
-from rotorfault.cli.app import AllowCode, app, finish
+from rotorfault.cli.app import AllowCode, app, finish, say, stopped
 
 if TYPE_CHECKING:
     from rotorfault.campaigns.api import Campaign
@@ -65,12 +65,11 @@ def campaign(
     try:
         done = fly_campaign(
             study, out, resume=resume, repair=repair, vehicle=vehicle, preset=preset, seed=seed, budget=budget,
-            workers=workers, scheduler=scheduler, say=lambda line: typer.echo(line, err=True),
+            workers=workers, scheduler=scheduler, say=lambda line: say(line, err=True),
             allow_code=allow_code,
         )  # fmt: skip
     except KeyboardInterrupt:
-        typer.echo("interrupted; what is done is kept, go on with the same command and --resume", err=True)
-        raise typer.Exit(130) from None
+        raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
     if report:
         _report(done)
 
@@ -114,11 +113,11 @@ def replay(
     finish(flown, target, figures)
     differences = campaign.differences(flight, flown)
     for line in differences:
-        typer.echo(f"warning: {line}", err=True)
+        say(f"warning: {line}", err=True)
     if differences:
-        typer.echo("warning: this is not the flight of the table; its numbers are above", err=True)
+        say("warning: this is not the flight of the table; its numbers are above", err=True)
     else:
-        typer.echo("its numbers are those of the campaign's table")
+        say("its numbers are those of the campaign's table")
 
 
 def _report(campaign: Campaign) -> None:
@@ -128,4 +127,4 @@ def _report(campaign: Campaign) -> None:
     with Busy("making the report"):
         paths = campaign.report()
     pictures = ", ".join(path.name for path in paths if path.suffix == ".png")
-    typer.echo(f"report in {paths[0]}; pictures in {paths[1].parent}: {pictures}, each as SVG too")
+    say(f"report in {paths[0]}; pictures in {paths[1].parent}: {pictures}, each as SVG too")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorfault.cli.app import app
+from rotorfault.cli.app import app, say
 
 
 @app.command()
@@ -30,4 +30,4 @@ def export(
 
     write = writer(to)
     data = dataset.as_flight_data(load(flight).data)
-    typer.echo(f"wrote {write(data, target_of(to, flight, out), every, units)}")
+    say(f"wrote {write(data, target_of(to, flight, out), every, units)}")

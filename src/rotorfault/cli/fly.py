@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorfault.base.errors import InputError
-from rotorfault.cli.app import AllowCode, Assignments, app, finish
+from rotorfault.base.plain_text import file_name
+from rotorfault.cli.app import AllowCode, Assignments, app, finish, say
 
 if TYPE_CHECKING:
     from rotorfault.flight.flight import Flight
@@ -61,7 +61,7 @@ def fly(
         settings = {"controller.preset": preset, **settings}
     checked = prepare(scenario, controller, settings, seed, allow_code)
     # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
-    folder = out or Path("results") / re.sub(r"[^\w.-]+", "_", f"{checked.name}-{_name(checked)}")
+    folder = out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")
     output_folder(folder)
     _warn(checked)
     finish(_flown(checked, engine), folder, figures)
@@ -81,15 +81,20 @@ def _warn(scenario: Scenario) -> None:
     from rotorfault.model.block import Context
     from rotorfault.plant import FAULT
 
+<<<<<<< HEAD
     for warning in [*sampled_data_warnings(scenario), *unflown(scenario)]:
         typer.echo(f"warning: {warning}", err=True)
+=======
+    for warning in sampled_data_warnings(scenario):
+        say(f"warning: {warning}", err=True)
+>>>>>>> 96b830b (Let no Ctrl-C get lost, and take text from others for text)
     vehicle = scenario.mismatch.applied(scenario.vehicle.vehicle)
     for number, part in enumerate(scenario.all(FAULT)):
         fault = part.make()
         onset = fault.onset(fault.parameters(Context(vehicle, scenario.period)))
         if onset >= scenario.duration:
             text = f"fault.{number} sets in at {onset:g} s, after the end of the flight at {scenario.duration:g} s"
-            typer.echo(f"warning: {text}", err=True)
+            say(f"warning: {text}", err=True)
 
 
 def _flown(scenario: Scenario, engine: str | None) -> Flight:
@@ -132,4 +137,4 @@ def compare(
     comparison.print_table(loaded)
     if figures:
         written = comparison.draw(loaded, folder)
-        typer.echo(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+        say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rotorfault.base.errors import InputError
-from rotorfault.cli.app import AllowCode, app
+from rotorfault.cli.app import AllowCode, app, say
 
 
 @app.command("list")
@@ -18,7 +18,7 @@ def list_parts(
     """List everything registered, one line each."""
     from rotorfault.cli import catalogue
 
-    typer.echo(catalogue.text(what))
+    say(catalogue.text(what))
 
 
 @app.command()
@@ -32,7 +32,7 @@ def new(
     from rotorfault.cli import catalogue
 
     path = catalogue.write_new(what, name, out, force)
-    typer.echo(f"wrote {path}; check it with: rotorfault check {path}")
+    say(f"wrote {path}; check it with: rotorfault check {path}")
 
 
 @app.command()
@@ -63,11 +63,11 @@ def check(
 
         settings: dict[str, object] = {}
         override_all(settings, parse_overrides(assignments or []))
-        typer.echo(str(check_block(file, settings)))
+        say(str(check_block(file, settings)))
         return
     if assignments:
         raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
-    typer.echo(catalogue.check(Path(file), allow_code))
+    say(catalogue.check(Path(file), allow_code))
 
 
 @app.command()
@@ -92,4 +92,4 @@ def trim(
     from rotorfault.analysis.trim import trim_report
     from rotorfault.cli.losses import parse_losses
 
-    typer.echo(trim_report(vehicle, controller, preset, period, parse_losses(losses or [])).text())
+    say(trim_report(vehicle, controller, preset, period, parse_losses(losses or [])).text())

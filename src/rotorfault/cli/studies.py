@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from rotorfault.base.errors import InputError, MissingExtraError
-from rotorfault.cli.app import app
+from rotorfault.cli.app import app, say, stopped
 
 
 @app.command()
@@ -32,15 +32,14 @@ def paper(
 
     if case is not None or controller is not None:
         for result in study.fly_part(out, case, controller, workers):
-            typer.echo(f"{result.run.id}: {study.line(result)}")
-        typer.echo(f"flights are in {out / 'flights'}; the whole paper: rotorfault paper --out {out}")
+            say(f"{result.run.id}: {study.line(result)}")
+        say(f"flights are in {out / 'flights'}; the whole paper: rotorfault paper --out {out}")
         return
     try:
         done = study.reproduce(out, quick, workers)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted; what is done is kept in {out}, start again to go on", err=True)
-        raise typer.Exit(130) from None
-    typer.echo(study.text(done))
+        raise stopped(f"interrupted; what is done is kept in {out}, start again to go on") from None
+    say(study.text(done))
 
 
 @app.command()
@@ -66,7 +65,7 @@ def tune(
 ) -> None:
     """Search a controller's gains by CMA-ES on training flights; same budget and objective for all.
 
-    Needs the extra 'tune'. Ctrl-C ends the search and gives the best so far.
+    Needs the extra 'tune'. Ctrl-C ends the search, gives the best so far, and exits with 130.
 
     Example: rotorfault tune smc --generations 100 --out smc.toml
     """
@@ -86,10 +85,13 @@ def tune(
         )
     text = search.as_toml(tuned, name)
     if out is None:
-        typer.echo(text)
+        say(text)
     else:
         write_atomically(out, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-        typer.echo(f"wrote {out}, objective {tuned.record['objective']:g}")
+        say(f"wrote {out}, objective {tuned.record['objective']:g}")
+    if (done := tuned.record["generations"]) < generations:
+        place = "above" if out is None else f"in {out}"
+        raise stopped(f"interrupted after {done} of {generations} generations; the best until then is {place}")
 
 
 @app.command()
@@ -128,11 +130,11 @@ def bench(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from rotorfault.bench import study
 
-    found = study.run(with_peers, quick, lambda line: typer.echo(f"measuring: {line}", err=True))
-    typer.echo(study.text(found))
+    found = study.run(with_peers, quick, lambda line: say(f"measuring: {line}", err=True))
+    say(study.text(found))
     if as_json is not None:
         study.save(found, as_json)
-        typer.echo(f"\nwrote {as_json}")
+        say(f"\nwrote {as_json}")
     if figure is not None:
         study.draw(found, figure)
-        typer.echo(f"wrote {figure}")
+        say(f"wrote {figure}")

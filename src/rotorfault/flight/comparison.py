@@ -7,7 +7,9 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from rotorfault.base.plain_text import one_line
 from rotorfault.flight.flight import Flight, load
 from rotorfault.report import figures
 from rotorfault.results.text import UNTIL_LOST, comparison
@@ -27,11 +29,13 @@ def labelled(paths: Sequence[Path]) -> dict[str, Flight]:
 def print_table(flights: dict[str, Flight]) -> None:
     """Print the numbers of all flights, a column each."""
     header, *lines = comparison({label: flight.summary() for label, flight in flights.items()})
-    table = Table(title=", ".join(dict.fromkeys(str(f.data.attrs["scenario"]) for f in flights.values())))
+    names = dict.fromkeys(str(f.data.attrs["scenario"]) for f in flights.values())
+    # As `Text`, for rich would take what stands in brackets in a name for markup.
+    table = Table(title=Text(one_line(", ".join(names))))
     for text in header:
-        table.add_column(text, overflow="fold")
+        table.add_column(Text(one_line(text)), overflow="fold")
     for line in lines:
-        table.add_row(*line)
+        table.add_row(*(Text(one_line(text)) for text in line))
     if any(not flight.outcome.survived for flight in flights.values()):
         table.caption = f"{UNTIL_LOST} of a flight that was lost: over the time before, not to be compared"
     Console().print(table)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rotorfault.base.plain_text import one_line
+
 
 def number(value: float | None, unit: str = "", digits: int = 4) -> str:
     """A number with its unit; a dash for none."""
@@ -81,7 +83,8 @@ def landing_rows(landing: dict[str, Any]) -> list[tuple[str, str]]:
 def summary_text(summary: dict[str, Any]) -> str:
     """A flight's numbers, a line each; those of a lost flight say that they are of the time before."""
     by = summary["controller"] + (f" ({summary['preset']})" if summary.get("preset") else "")
-    head = f"{summary['scenario']} flown by {by} on {summary['plant']} ({summary['engine']} engine)"
+    # Names may come from a file: none may look like a line of ours.
+    head = one_line(f"{summary['scenario']} flown by {by} on {summary['plant']} ({summary['engine']} engine)")
     if not summary["survived"]:
         head += (
             f"\n  lost: the numbers are those of the {number(summary['end_time'], 's')} before it {_fate(summary)}"

@@ -53,11 +53,11 @@ def _maps(maps: Maps) -> dict[str, Figure]:
         for k, pair in enumerate(maps.pairings)
     ]
     if len(parts) == 1:
-        figures = {"success": success_maps(maps, [panel for each in variants for panel in each])}
+        figures: dict[str, Figure] = {"success": success_maps(maps, [panel for each in variants for panel in each])}
         if pairs:
             figures["difference"] = difference_maps(maps, [panel for each in pairs for panel in each])
         return figures
-    figures: dict[str, Figure] = {}
+    figures = {}
     for variant, panels in zip(maps.variants, variants, strict=True):
         figures[_free(f"success-{_file(variant.label)}", figures)] = success_maps(maps, panels, variant.label)
     for pair, panels in zip(maps.pairings, pairs, strict=True):
