@@ -81,13 +81,8 @@ def _warn(scenario: Scenario) -> None:
     from rotorfault.model.block import Context
     from rotorfault.plant import FAULT
 
-<<<<<<< HEAD
     for warning in [*sampled_data_warnings(scenario), *unflown(scenario)]:
-        typer.echo(f"warning: {warning}", err=True)
-=======
-    for warning in sampled_data_warnings(scenario):
         say(f"warning: {warning}", err=True)
->>>>>>> 96b830b (Let no Ctrl-C get lost, and take text from others for text)
     vehicle = scenario.mismatch.applied(scenario.vehicle.vehicle)
     for number, part in enumerate(scenario.all(FAULT)):
         fault = part.make()
