@@ -10,6 +10,7 @@ from typing import Any
 import killable
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from campaign_studies import TINY, fly_in_small_blocks
 from gates import needs_simd
@@ -22,6 +23,7 @@ from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
 from rotorfault.campaigns.replay import differences, identifier_of
+from rotorfault.campaigns.report.maps import maps
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
@@ -52,6 +54,23 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rotorfault.campaigns.rounds.FLIGHTS_IN_BLOCK", 10)
         return complete(tiny(), tmp_path_factory.mktemp("undisturbed") / "campaign")
+
+
+@pytest.mark.usefixtures("small_blocks")
+def test_what_is_said_at_the_end_is_what_the_report_says(tmp_path: Path) -> None:
+    """Over several rounds: of the first, for later ones fly where success is uncertain."""
+    said: list[str] = []
+    study = tiny()
+    with run.open_store(study, tmp_path / "campaign", False) as store:
+        run.fly(study, store, InProcess(), said.append)
+    assert len(said) > 1
+    page = maps(study, pq.read_table(tmp_path / "campaign" / "flights.parquet"))
+    rates = [f"{variant.label} {100.0 * float(variant.total.estimate):.1f} %" for variant in page.variants]
+    assert said[-1].endswith(f"success over the map, by round 1: {', '.join(rates)}")
+    every = [variant.success_rate.mean() for variant in page.variants]
+    assert every != pytest.approx([float(variant.total.estimate) for variant in page.variants]), (
+        "differs, by more flights"
+    )
 
 
 # --------------------------------------------------------------------------------------------------- the same table

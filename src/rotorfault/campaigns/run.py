@@ -26,6 +26,7 @@ from rotorfault.campaigns.store.store import Key, Store
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.assembly import assemble_group
 from rotorfault.flight.sweep import checked_columns, groups_of
+from rotorfault.maths.arrays import Array
 
 BYTES_PER_FLIGHT = 400
 ROOMS = (
@@ -96,6 +97,7 @@ def fly(study: Study, store: Store, executor: Executor, say: Say = lambda _: Non
     tally = Tally(study)
     work = partial(fly_block, study, threads=executor.threads)
     keys: list[Key] = []
+    rates = np.zeros(len(study.variant))
     for round in itertools.count():
         flights = next_round(study, tally.successes, tally.trials)
         if not flights.size:
@@ -106,7 +108,9 @@ def fly(study: Study, store: Store, executor: Executor, say: Say = lambda _: Non
         keys += [task.key for task in tasks]
         for task in tasks:
             tally.add(store.get(*task.key))
-        say(_summary(study, round, tally))
+        if not round:
+            rates = (tally.successes / tally.trials).mean(axis=1)
+        say(_summary(study, round, int(tally.trials.sum()), rates))
     store.finish(keys)
     return Progress(round, flown, int(tally.successes.sum()), time.monotonic() - start)
 
@@ -133,10 +137,13 @@ class _Parts:
         return f"{100.0 * self._successes / self._flights:.0f} % of them successful"
 
 
-def _summary(study: Study, round: int, tally: Tally) -> str:
-    # Every cell counts alike: later rounds fly where success is uncertain, which says nothing about the map.
-    rates = ", ".join(
-        f"{variant.label} {100.0 * rate:.1f} %"
-        for variant, rate in zip(study.variant, (tally.successes / tally.trials).mean(axis=1), strict=True)
+def _summary(study: Study, round: int, flights: int, rates: Array) -> str:
+    """A line after each round.
+
+    The success rates are the report's: of the first round, each cell counting alike. How many flights a cell has in
+    later rounds is decided by results, and rates of all flights would be other numbers.
+    """
+    each = ", ".join(
+        f"{variant.label} {100.0 * rate:.1f} %" for variant, rate in zip(study.variant, rates, strict=True)
     )
-    return f"round {round + 1}: {tally.trials.sum():,} flights so far; success over the map: {rates}"
+    return f"round {round + 1}: {flights:,} flights so far; success over the map, by round 1: {each}"
