@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper test test-numpy lint types bench peers maps benchmarks clean check-python
+.PHONY: help venv paper ranges test test-numpy lint types bench peers maps benchmarks clean check-python
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-14s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -49,6 +49,9 @@ venv: .venv/.stamp-develop ## Create .venv with rotorfault, the tests' and the d
 
 paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and claim
 	.venv/$(BIN)/rotorfault paper --out results/paper
+
+ranges: .venv/.stamp-develop ## Search gains anew and give the paper's Table 1 as ranges (15 min on 2 idle cores)
+	.venv/$(BIN)/rotorfault ranges --out results/ranges
 
 test: .venv/.stamp-develop ## Run the tests
 	.venv/$(BIN)/python -m pytest -n 2

@@ -32,6 +32,8 @@ from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehi
 from rotorfault.scenario.part import DEFAULT_PRESET, NO_PRESET, Part
 from rotorfault.scenario.scenario import Mismatch, Start, scenario_fields
 from rotorfault.scenario.slots import SLOTS
+from rotorfault.studies.paper import range_tables, ranges
+from rotorfault.tuning.training import OBJECTIVES, WEIGHTS
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
@@ -169,6 +171,10 @@ def tables() -> dict[str, str]:
     found["signals"] = _loop_signals_table()
     found["signals/parts"] = _part_signals_table()
     found["attainable"] = _attainable_table()
+    found["tuning/weights"] = _weights_table()
+    objectives = [[f"`{name}`", kind.says] for name, kind in OBJECTIVES.items()]
+    found["tuning/objectives"] = _markdown(["objective", "what it is"], objectives)
+    found |= _range_tables()
     return found
 
 
@@ -310,6 +316,21 @@ def _markdown(header: list[str], rows: list[list[str]]) -> str:
     return "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
 
 
+def _weights_table() -> str:
+    rows = [[name, f"{value:g}", unit, why] for name, value, unit, why in WEIGHTS]
+    return _markdown(["part of the objective", "weight", "unit", "reason"], rows)
+
+
+def _range_tables() -> dict[str, str]:
+    """Table 1 of the paper as ranges, from the numbers that come with the package."""
+    known = ranges.kept()
+    found = range_tables.pairs(known.gains)
+    tables = {"ratios": range_tables.ratio_rows(found), "numbers": range_tables.number_rows(found)}
+    tables["searches"] = range_tables.search_rows(known.gains)
+    texts = {f"ranges/{name}": _markdown(list(rows[0]), [list(r) for r in rows[1:]]) for name, rows in tables.items()}
+    return texts | {"ranges/said": f"{range_tables.headline(found)}\n"}
+
+
 def updated(text: str, every: dict[str, str]) -> str:
     """A page with all its tables as the code has them; raises KeyError for a name that there is not."""
     return BLOCK.sub(lambda block: f"{block[1]}\n{every[block[2]]}\n{block[4]}", text)
@@ -326,7 +347,7 @@ def main() -> None:
     if unknown:
         parser.error(f"no table '{unknown[0]}'; there are {', '.join(every)}")
     if options.write:
-        for path in sorted(DOCS.rglob("*.md")):
+        for path in [*sorted(DOCS.rglob("*.md")), DOCS.parent / "README.md"]:
             before = path.read_text(encoding="utf-8")
             after = updated(before, every)
             if after != before:

@@ -44,6 +44,7 @@ LAZY = {
     "rotorfault.flight.flight": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
+    "rotorfault.studies.paper.ranges": {"rotorfault.tuning.search": "cma need not be installed"},
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
 }
 # Modules that load others by names that are data: only there may `import_module` stand, which hides from readers,

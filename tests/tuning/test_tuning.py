@@ -16,7 +16,8 @@ from rotorfault.autopilot.control.riccati_reference import solve_iterated
 from rotorfault.autopilot.control.sdre import Weights
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
-from rotorfault.flight.assembly import assemble_all, assemble_with
+from rotorfault.flight.assembly import assemble_all
+from rotorfault.flight.candidates import assemble_with
 from rotorfault.flight.fly import fly
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten

@@ -1,4 +1,4 @@
-"""The commands of studies and measurements: `paper`, `tune` and `bench`."""
+"""The commands of studies and measurements: `paper`, `ranges`, `tune` and `bench`."""
 
 from __future__ import annotations
 
@@ -43,6 +43,63 @@ def paper(
 
 
 @app.command()
+def ranges(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for searches and numbers.")] = Path(
+        "results/ranges"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="One short search each: ranges far too wide.")] = False,
+    again: Annotated[
+        bool, typer.Option("--again", help="Fly the gains that come with rotorfault again, without a search.")
+    ] = False,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, max=100, help="Seeds of each search; 3 if not given, 1 with --quick.")
+    ] = None,
+    generations: Annotated[int | None, typer.Option(min=1, help="Generations of each search.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core if not given.")] = None,
+) -> None:
+    """Print Table 1 of the paper as ranges: what the ratio of costs owes to how gains were searched.
+
+    Searches both laws anew for each of three objectives, in two boxes and from several seeds (15 minutes on 2 idle
+    cores), and flies the paper's cases with what was found. Writes DIR/ranges.json. Searches that are done are not
+    done again; an interrupted run goes on where it was. Needs the extra 'tune', but for --again.
+
+    Example: rotorfault ranges --again
+    """
+    from rotorfault.base.files import output_folder, write_atomically
+    from rotorfault.studies.paper import range_tables
+    from rotorfault.studies.paper import ranges as study
+
+    if again and (quick or seeds or generations):
+        raise InputError("--again flies gains that are there; --quick, --seeds and --generations belong to a search")
+    output_folder(out)
+    if again:
+        kept = study.kept()
+        budget, gains = kept.budget, study.flown(kept.gains)
+    else:
+        _needs_cma()
+        budget = study.QUICK if quick else study.FULL
+        budget = budget._replace(
+            seeds=budget.seeds if seeds is None else tuple(range(1, seeds + 1)),
+            generations=generations or budget.generations,
+        )
+        try:
+            gains = study.search_all(out, budget, workers)
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted; what is done is kept in {out}, start again to go on", err=True)
+            raise typer.Exit(130) from None
+    presets = study.shipped()
+    content = study.as_json(gains, budget, presets)
+    write_atomically(out / study.KEPT, lambda temporary: temporary.write_text(content, encoding="utf-8"))
+    typer.echo(range_tables.text(gains, presets))
+    typer.echo(f"\n{len(gains)} searches of {budget.flights:,} training flights each; see {out / study.KEPT}")
+
+
+def _needs_cma() -> None:
+    if importlib.util.find_spec("cma") is None:
+        raise MissingExtraError("tuning needs the package cma, which is not installed; install rotorfault[tune]")
+
+
+@app.command()
 def tune(
     controller: Annotated[
         str, typer.Argument(help="roismc, smc, ismc, sdre, or FILE.py:NAME for a class of your own with `search`.")
@@ -69,8 +126,7 @@ def tune(
 
     Example: rotorfault tune smc --generations 100 --out smc.toml
     """
-    if importlib.util.find_spec("cma") is None:
-        raise MissingExtraError("tuning needs the package cma, which is not installed; install rotorfault[tune]")
+    _needs_cma()
     from rotorfault.base.files import output_folder, write_atomically
     from rotorfault.base.progress import Bar
     from rotorfault.scenario.overrides import parse_overrides

@@ -128,59 +128,23 @@ def assemble_all(scenarios: Sequence[Scenario]) -> Batch:
                 "reference); fly it in a batch of its own"
             )
     return first._replace(
-        state=_stacked(first.state, [batch.state for batch in batches]),
-        parameters=_stacked(first.parameters, [batch.parameters for batch in batches]),
+        state=stacked(first.state, [batch.state for batch in batches]),
+        parameters=stacked(first.parameters, [batch.parameters for batch in batches]),
         flights=len(batches),
         # Each by its own seed, whatever its place: a flight is the same alone and in any batch.
         seeds=tuple(seed for batch in batches for seed in batch.seeds),
     )
 
 
-def assemble_with(scenarios: Sequence[Scenario], slot: Slot[Any], parts: Sequence[Part[Any]]) -> Batch:
-    """One batch of every scenario with every part of a slot, as of controllers whose gains are searched.
-
-    The same as `assemble_all` of all pairs, the scenarios running faster, but each is assembled once only.
+def stacked(template: R, records: Sequence[R]) -> R:
+    """Records of one flight each as one whose leaves are arrays.
 
     Parameters
     ----------
-    scenarios : sequence of Scenario
-        That differ in numbers only.
-    slot : Slot
-        Of the parts; one of belief.
-    parts : sequence of Part
-        That differ in numbers only.
-
-    Raises
-    ------
-    InputError
-        If scenarios or parts differ in structure.
+    template : record
+        Of their type.
+    records : sequence of record
     """
-    base, count = assemble_all([one.model_copy(update={slot.name: parts[0]}) for one in scenarios]), len(parts)
-    ends = [assemble(scenarios[0].model_copy(update={slot.name: part})) for part in (parts[0], parts[-1])]
-    choices = [_without_numbers(part.settings.model_dump()) for part in parts]
-    if any(choice != choices[0] for choice in choices) or not same_code(*ends):
-        raise InputError(f"{slot.name}: the parts differ in more than numbers; fly each in a batch of its own")
-    contexts = [Context(one.vehicle.vehicle, one.period) for one in scenarios]
-    own = [made.parameters(context) for made in (part.make() for part in parts) for context in contexts]
-    many = unflatten(base.parameters, [np.tile(np.broadcast_to(leaf, (base.flights,)), count)
-                                       for leaf in flatten(base.parameters)])  # fmt: skip
-    parameters = many._replace(parts=many.parts._replace(**{slot.name: _stacked(own[0], own)}))
-    starts = [start_of(one) for one in scenarios] * count
-    seeds = base.seeds * count
-    state = initial_state(base.loop, _stacked(starts[0], starts), base.reference, seeds, parameters)
-    return base._replace(state=state, parameters=parameters, flights=base.flights * count, seeds=seeds)
-
-
-def _without_numbers(settings: Any) -> Any:
-    """What of settings may decide which code runs: everything but the numbers."""
-    if isinstance(settings, dict):
-        return {key: _without_numbers(value) for key, value in settings.items()}
-    if isinstance(settings, list | tuple):
-        return [_without_numbers(value) for value in settings]
-    return None if isinstance(settings, float) else settings
-
-
-def _stacked(template: R, records: Sequence[R]) -> R:
     rows = np.array([[float(leaf) for leaf in flatten(record)] for record in records]).T
     return unflatten(template, list(rows))
 

@@ -16,14 +16,14 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.foreign import is_place
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch, no_watch
-from rotorfault.flight.assembly import assemble_all, assemble_with
+from rotorfault.flight.assembly import assemble_all
+from rotorfault.flight.candidates import assemble_with
 from rotorfault.maths.arrays import Array
 from rotorfault.model.telemetry import Layout
 from rotorfault.results.flight_data import flight_data
 from rotorfault.results.score_table import score_table
-from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import Scenario
-from rotorfault.tuning.space import SPACES, at_bounds, settings_at, space_of
+from rotorfault.tuning.space import SPACES, at_bounds, candidate, settings_at, space_of
 from rotorfault.tuning.training import NEEDED, balanced, objective_of, training_groups
 
 # Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which
@@ -132,9 +132,8 @@ def _evaluate(
 ) -> list[float]:
     """Mean objective of each candidate; the groups count alike."""
     total = np.zeros(len(candidates))
-    start = {"kind": controller} | ({"preset": "none"} if controller in SPACES else {})
-    parts = [part_from(CONTROLLER, {**start, **table}, allow=(controller,)) for table in candidates]
     for group in groups:
+        parts = [candidate(group[0], controller, table) for table in candidates]
         scenarios = [one.model_copy(update={CONTROLLER.name: part}) for part in parts for one in group]
         whole = assemble_with(group, CONTROLLER, parts) if controller in SPACES else assemble_all(scenarios)
         known = Layout(tuple(signal for signal in whole.loop.layout.signals if signal.name in NEEDED))

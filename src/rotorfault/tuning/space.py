@@ -21,7 +21,8 @@ from rotorfault.autopilot.control.sdre import Weights
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.foreign import is_place
 from rotorfault.scenario.overrides import override_all
-from rotorfault.scenario.part import part_from
+from rotorfault.scenario.part import Part, part_from
+from rotorfault.scenario.scenario import Scenario
 
 # Dotted key (below `controller`), lowest, start, highest; searched on a logarithmic scale.
 Space = list[tuple[str, float, float, float]]
@@ -182,3 +183,26 @@ def settings_at(controller: str, values: dict[str, float]) -> dict[str, Any]:
         for key in ("slope", "reaching", "K"):
             law["attitude"][key] = [v[f"roll.{key}"]] * 2 + [v[f"yaw.{key}"]]
     return {**tables, "law": law}
+
+
+def candidate(scenario: Scenario, controller: str, tables: dict[str, Any]) -> Part[Any]:
+    """A controller with some gains, for a scenario: its choices that are no gains stay, such as `cascade.tracking`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Flown with the controller without a preset, or by another one.
+    controller : str
+    tables : dict
+        Of the controller, as `settings_at` or a preset have them.
+    """
+    if controller not in SPACES:
+        return part_from(CONTROLLER, {"kind": controller, **tables}, allow=(controller,))
+    own = scenario.as_tables()
+    override_all(own, {"controller.kind": controller, "controller.preset": "none"})
+    return part_from(CONTROLLER, _merged(own[CONTROLLER.name], tables))
+
+
+def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    both = {key: _merged(below[key], value) for key, value in above.items() if isinstance(below.get(key), dict)}
+    return below | above | both

@@ -36,6 +36,7 @@ from rotorfault.results.flight_data import FlightData
 from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
+from rotorfault.tuning.space import SPACES
 
 # Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many
 # does not hide what the others are worth.
@@ -56,6 +57,25 @@ COST_WEIGHT = 0.3
 TILT_FREE = 1.1  # rad; the largest demand that a search may allow, see `cascade.tilt_max` in the search space
 # Per decade of (rad/s^2)^2: settles between flights that are alike in all else, in favour of the quieter one.
 EFFORT_WEIGHT = 0.04
+# What pages say of them: value, unit, reason. The comments above say the same in more words.
+WEIGHTS: tuple[tuple[str, float, str, str], ...] = (
+    ("a lost flight", LOST, "s", "five times a tuned set-point flight: survival first, yet one of many hides none"),
+    ("time of a fault that interrupts the approach", INTERRUPTED, "1",
+     "1 would ask for settling before the fault at any price, 0 would reward who waits for it"),
+    ("excursion after the fault that is free", EXCURSION_FREE, "bands",
+     "no reason to make it smaller still; the rest of the band is a reserve"),
+    ("error left at the end", LEFT_WEIGHT, "s per band", "leads on among flights that do not settle, else all alike"),
+    ("tracking error, sinusoid", TRACKING_WEIGHT["paper-sinusoid"], "s/m",
+     "all laws follow closely: a centimetre counts as a tenth of a second"),
+    ("tracking error, square wave", TRACKING_WEIGHT["paper-square"], "s/m",
+     "nobody follows the jumps: half a metre counts as one second"),
+    ("cost, on log10(1 + J)", COST_WEIGHT, "s per decade",
+     "ten times the cost must save 0.3 s; a quarter of what a tuned flight comes to"),
+    ("rotor flagged wrongly, or missed", 1.0, "s", "as bad as settling a second later"),
+    ("tilt beyond 1.1 rad", 1.0, "s/rad", "the largest tilt that may be demanded: more is a flight near its limit"),
+    ("effort, on log10(1 + mean square angular acceleration)", EFFORT_WEIGHT, "s per decade",
+     "settles between flights alike in all else, for the quieter one"),
+)  # fmt: skip
 # Signals that objectives read, as far as a controller has them.
 NEEDED = (
     "position", "position_reference", "fault_flag", "torque_demand", "controller.virtual_attitude",
@@ -89,7 +109,8 @@ def training_groups(
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([FIRST_SEED])))
     groups = []
     for name, own, count in GROUPS:
-        settings = {"controller.kind": controller, "record_period": 0.01, **own, **overrides}
+        plain = {"controller.preset": "none"} if controller in SPACES else {}
+        settings = {"controller.kind": controller, **plain, "record_period": 0.01, **own, **overrides}
         base = load_scenario(name, settings)
         group = []
         for i in range(count if neighbours is None else min(count, neighbours)):

@@ -13,7 +13,7 @@ from jinja2 import Environment, StrictUndefined
 
 from rotorfault.autopilot.presets import record as record_of
 from rotorfault.base.versions import versions
-from rotorfault.studies.paper import ablation, figures, sensitivity, table1
+from rotorfault.studies.paper import ablation, figures, range_tables, ranges, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.paper.verdicts import Claim
 from rotorfault.studies.runs import Result
@@ -42,6 +42,7 @@ def render(page: Page) -> str:
     environment.filters["number"] = _number
     return environment.from_string(template).render(
         table=table1.rows(page.results),
+        ranges=_ranges(),
         claims=page.claims,
         counts=_counts(page.claims),
         figures=_figures(page, figures.CAPTIONS),
@@ -88,6 +89,20 @@ def _flights(results: Mapping[str, Result]) -> list[dict[str, Any]]:
         result = results[run.id]
         rows.append({"id": run.id, "command": run.command, "seconds": result.seconds, **result.summary})
     return rows
+
+
+def _ranges() -> dict[str, Any]:
+    """Table 1 as ranges, from the numbers that come with the package."""
+    kept = ranges.kept()
+    found = range_tables.pairs(kept.gains)
+    return {
+        "pairs": len(found),
+        "ratios": range_tables.ratio_rows(found),
+        "numbers": range_tables.number_rows(found),
+        "searches": range_tables.search_rows(kept.gains),
+        "said": range_tables.headline(found),
+        "version": kept.version,
+    }
 
 
 def _rows(path: Path) -> list[list[str]]:
