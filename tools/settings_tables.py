@@ -328,7 +328,7 @@ def _range_tables() -> dict[str, str]:
     tables = {"ratios": range_tables.ratio_rows(found), "numbers": range_tables.number_rows(found)}
     tables["searches"] = range_tables.search_rows(known.gains)
     texts = {f"ranges/{name}": _markdown(list(rows[0]), [list(r) for r in rows[1:]]) for name, rows in tables.items()}
-    return texts | {"ranges/said": f"{range_tables.headline(found)}\n"}
+    return texts | {"ranges/said": range_tables.headline(found).replace(". ", ".\n") + "\n"}
 
 
 def updated(text: str, every: dict[str, str]) -> str:

@@ -23,7 +23,7 @@ from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.scenario.part import part_from
 from rotorfault.tuning import search, training
-from rotorfault.tuning.space import SPACES, at_bounds, settings_at, space_of
+from rotorfault.tuning.space import SPACES, at_bounds, candidate, settings_at, space_of
 
 OWN = f"{EXAMPLES / 'controller.py'}:PdController"
 
@@ -88,7 +88,7 @@ def test_objectives_differ_by_what_they_say(monkeypatch: pytest.MonkeyPatch) -> 
     groups = training.training_groups("smc", {})
     (table,) = [settings_at("smc", {entry[0]: entry[2] for entry in SPACES["smc"]})]
     (one,) = groups[0]
-    ours = one.model_copy(update={"controller": part_from(CONTROLLER, {"kind": "smc", "preset": "none", **table})})
+    ours = one.model_copy(update={"controller": candidate(one, "smc", table)})
     J = fly(ours).summary()["cost"]
     worth = {
         name: search._evaluate("smc", [table], groups, kind.worth)[0] for name, kind in training.OBJECTIVES.items()
