@@ -81,6 +81,8 @@ class Flight:
         turned = momentum[:, None] * np.column_stack([-omega[:, 1], omega[:, 0], 0 * omega[:, 0]])
         dv = T * (axis * thrust.sum(1)[:, None] / self.m - [0, 0, self.g] - self.vehicle.linear_drag / self.m * v)
         dw = T * (self.torque(thrust) + turned - np.cross(omega, self.J * omega)) / self.J
+        total = -(speed @ YAW)
+        dw[1:, 2] -= self.vehicle.rotor_reaction * self.vehicle.rotor_inertia * np.diff(total) / self.J[2]
         dv[0] = dw[0] = 0
         return dv, dw
 
@@ -118,9 +120,12 @@ def surface(rates: Array, change: Array, sigma_of: Any, bandwidth: Array, group:
     return np.array(sigmas)
 
 
-@pytest.mark.parametrize("gamma_1", [0.0, 0.3])
-def test_the_surface_is_that_of_the_page(flight: Flight, gamma_1: float) -> None:
-    one = flight if gamma_1 == 0.0 else Flight(**{"controller.law.position.gamma_1": gamma_1, "duration": 0.6})
+OTHER = {"controller.law.position.gamma_1": 0.3, "vehicle.rotor_reaction.value": 1.0, "duration": 0.6}
+
+
+@pytest.mark.parametrize("changes", [{}, OTHER])
+def test_the_surface_is_that_of_the_page(flight: Flight, changes: dict[str, float]) -> None:
+    one = Flight(**changes) if changes else flight
     dv, dw = one.explained(one["loss_believed"])
     lag = one.cascade.horizontal_lag
     e = np.linalg.norm(
@@ -133,11 +138,8 @@ def test_the_surface_is_that_of_the_page(flight: Flight, gamma_1: float) -> None
         one["velocity_estimated"], dv, lambda s, _: s, np.array([lag, lag, one.w0]), one.law.position, e
     )
     close(position, one["controller.sigma_position"])
-    if gamma_1 == 0.0:
-        attitude = surface(
-            one["body_rates_estimated"], dw, lambda s, _: s, np.full(3, one.w0), one.law.attitude, 0 * e
-        )
-        close(attitude, one["controller.sigma_attitude"])
+    attitude = surface(one["body_rates_estimated"], dw, lambda s, _: s, np.full(3, one.w0), one.law.attitude, 0 * e)
+    close(attitude, one["controller.sigma_attitude"])
     # The belief of the same instant, and not of the one before, is what the surface is told.
     late, _ = one.explained(np.vstack([one["loss_believed"][:1], one["loss_believed"][:-1]]))
     if one["loss_believed"].any():
