@@ -109,8 +109,8 @@ def unflown(scenario: Scenario) -> list[str]:
     """
     source, end = scenario[REFERENCE].make(), scenario.duration
     span = source.span()
-    if not isinstance(source, Csv) or span is None:
-        return []
+    if not isinstance(source, Csv) or span is None or not (span[0] < end and span[1] > 0.0):
+        return []  # what lies outside the flight is refused
     told = []
     if span[0] > 0.0:
         told.append(f"the reference's table begins at {span[0]:g} s; until then its first row is held")
