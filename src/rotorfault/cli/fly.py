@@ -83,7 +83,7 @@ def _warn(scenario: Scenario) -> None:
 
     for warning in [*sampled_data_warnings(scenario), *unflown(scenario)]:
         say(f"warning: {warning}", err=True)
-    vehicle = scenario.mismatch.applied(scenario.vehicle.vehicle)
+    vehicle = scenario.mismatch.applied(scenario.vehicle)
     for number, part in enumerate(scenario.all(FAULT)):
         fault = part.make()
         onset = fault.onset(fault.parameters(Context(vehicle, scenario.period)))

@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.base.errors import InputError
@@ -29,8 +30,9 @@ from rotorfault.plant.ground import GROUND
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import Part
-from rotorfault.scenario.scenario import Scenario, scenario_fields, scenario_from
+from rotorfault.scenario.scenario import Scenario, scenario_fields, scenario_from, true_vehicle
 from rotorfault.scenario.slots import SLOTS
+from rotorfault.scenario.time_grid import require_on_grid
 
 R = TypeVar("R")
 Own = Mapping[Slot[Any], AnyBlock]
@@ -254,9 +256,10 @@ class _Assembly:
             vehicles = self.objects("vehicle"), *((self.objects("mismatch"),) if truth else ())
             pairs, inverse = _different(vehicles)
             made = []
-            for pair in pairs:
-                vehicle, *mismatch = pair
-                made.append(Context(mismatch[0].applied(vehicle.vehicle) if mismatch else vehicle.vehicle, period))
+            for number, (vehicle, *mismatch) in enumerate(pairs):
+                about = f"flight {self.flights[np.argmax(inverse == number)]}"
+                true = true_vehicle(vehicle, mismatch[0], self.scenario.grid, about) if mismatch else vehicle.vehicle
+                made.append(Context(true, period))
             self._told[truth] = made, inverse
         return self._told[truth]
 
@@ -307,6 +310,12 @@ class _Assembly:
                 overridden(self.scenario, changes, f"flight {self.flights[flight]}")
                 raise
             made.append(one[int(index)] if index else one)
+            try:
+                if isinstance(made[-1], Part):
+                    require_on_grid(made[-1], name, self.scenario.grid)
+            except PydanticCustomError:
+                overridden(self.scenario, changes, f"flight {self.flights[flight]}")
+                raise
         return made, inverse.reshape(-1)
 
 

@@ -31,6 +31,13 @@ class Context(NamedTuple):
     period: float  # s, sampling period
 
 
+class TimeGrid(NamedTuple):
+    """The instants at which a flight is computed."""
+
+    period: float  # s, between sampling instants
+    step: float  # s, between two instants of the integration
+
+
 class Nothing(NamedTuple):
     """The record without numbers: for parts without parameters, memory or signals."""
 
@@ -54,6 +61,8 @@ class Block(Generic[InputsT, OutputT, MemoryT, ParametersT]):
         The same for `initial`; None for those of the first sampling instant.
     python_only : bool
         Whether it runs on Python floats only, because it keeps state or makes choices that cannot be traced.
+    limits_grid : bool
+        Whether there are time grids that cannot carry it, which `off_grid` then tells.
     """
 
     Settings: ClassVar[type[Strict]] = NoSettings
@@ -61,11 +70,26 @@ class Block(Generic[InputsT, OutputT, MemoryT, ParametersT]):
     normals: ClassVar[int] = 0
     first_normals: ClassVar[int | None] = None
     python_only: ClassVar[bool] = False
+    limits_grid: ClassVar[bool] = False
     slot: ClassVar[object] = None  # the `Slot` of the kind, set where the kind is defined
 
     def __init__(self, settings: Any = None) -> None:
         # Of the part's own class of settings, which a type parameter more would name at every use.
         self.settings: Any = self.Settings() if settings is None else settings
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Why a time grid cannot carry this part of the truth or task, if `limits_grid`; None if it can.
+
+        Parameters
+        ----------
+        grid : TimeGrid
+
+        Returns
+        -------
+        (str, str) or None
+            The setting that is at fault, empty for the step itself; what came, what is allowed, how to mend it.
+        """
+        return None
 
     def parameters(self, context: Context) -> ParametersT:
         """Numbers as a record; none, unless a part has some.

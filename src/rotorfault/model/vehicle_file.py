@@ -16,7 +16,7 @@ Units are the SI units of `rotorfault.model.vehicle.Vehicle` alone, so that no n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
@@ -113,6 +113,42 @@ class VehicleFile(Strict):
             if error is not None:
                 raise error
         return self
+
+    def with_factors(self, factors: Mapping[str, float]) -> VehicleFile:
+        """The same vehicle with some numbers times factors; it keeps all rules of a vehicle file.
+
+        Parameters
+        ----------
+        factors : mapping
+            By key, such as ``mass``; those that are 1 change nothing.
+
+        Raises
+        ------
+        PydanticCustomError
+            If such a vehicle is none.
+        """
+        changed: dict[str, Quantity] = {}
+        for key, factor in factors.items():
+            if factor == 1.0:
+                continue
+            old: Quantity = getattr(self, key)
+            value = old.value * factor
+            if not math.isfinite(value):
+                raise refusal(key, f"got {value!r} {old.unit}; allowed: a finite number")
+            changed[key] = Quantity.model_construct(value=value, unit=old.unit, source=old.source)
+            try:
+                for rule in type(self).model_fields[key].metadata:
+                    if isinstance(rule, AfterValidator):
+                        rule.func(changed[key])  # type: ignore[call-arg]
+            except PydanticCustomError as error:
+                raise refusal(key, error.message()) from None
+        if not changed:
+            return self
+        made = self.model_copy(update=changed)
+        for wrong in (made._check_inertia(), made._check_thrust()):
+            if wrong is not None:
+                raise wrong
+        return made
 
     def _check_inertia(self) -> PydanticCustomError | None:
         moments = {"x": self.inertia_x.value, "y": self.inertia_y.value, "z": self.inertia_z.value}

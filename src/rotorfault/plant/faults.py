@@ -33,13 +33,12 @@ from rotorfault.maths.scalar import (
     nearest,
     wrap_angle,
 )
-from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT
+from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT, TimeGrid
 from rotorfault.model.slot import Slot, register
-from rotorfault.plant.timed import Timed
+from rotorfault.plant.timed import Timed, rounded_share, share_since
 
 # Times are counted steps times a period, and may fall short of the time that was meant by rounding.
 TIME_TOLERANCE = 1e-9  # s
-_ROUNDING = 1e-6  # of an integration step: a share that differs by less from none or all of it is that
 
 
 class RotorFault(NamedTuple):
@@ -116,16 +115,6 @@ FAULT = Slot(
 def since(time: Scalar, start: Scalar) -> Scalar:
     """1 from `start` on, robust against rounding of the time; both in s."""
     return greater_equal(time, start - TIME_TOLERANCE)
-
-
-def share_since(time: Scalar, dt: Scalar, start: Scalar) -> Scalar:
-    """Share of the step of length `dt` from `time` on that is not before `start`; all in s."""
-    return _whole((time + dt - start) / dt)
-
-
-def _whole(share: Scalar) -> Scalar:
-    """A share of a step, 0 and 1 where it is that but for rounding."""
-    return clip((share - _ROUNDING) * (1.0 / (1.0 - 2.0 * _ROUNDING)), 0.0, 1.0)
 
 
 def rotor_faults(
@@ -276,12 +265,28 @@ class IntermittentParameters(NamedTuple):
 class Intermittent(Fault[Nothing, IntermittentParameters]):
     """Partial loss of one rotor's thrust that comes and goes with a period."""
 
+    limits_grid = True
+
     class Settings(OneRotorInterval):
         """From when to when, how often, for how long and how much."""
 
         period: float = Field(gt=0.0, description="time from one onset to the next [s]")
         duty: float = Field(0.5, gt=0.0, le=1.0, description="share of each period in which the loss is there")
         loss: float = Field(ge=0.0, le=1.0, description="lost share of the thrust while it is there, 0 to 1")
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Bursts, or the times between them, that are shorter than a step."""
+        s = self.settings
+        on, off = s.duty * s.period, (1.0 - s.duty) * s.period
+        short = min(on, off) if s.duty < 1.0 else on
+        if short >= grid.step * (1.0 - TIME_TOLERANCE):
+            return None
+        share = f"{on:.4g} s on and {off:.4g} s off"
+        longer = s.period * grid.step / short
+        return "period", (
+            f"got {s.period:g} s, {share}; allowed: each at least the integration step, {grid.step:g} s; with this "
+            f"duty a period of {longer:.4g} s, or a step of {short:.4g} s"
+        )
 
     def parameters(self, context: Context) -> IntermittentParameters:
         """Times, duty and loss."""
@@ -311,7 +316,7 @@ class Intermittent(Fault[Nothing, IntermittentParameters]):
         first, last = (clip(t, p.start, p.end) - p.start for t in (time, time + dt))
         # Time on since the start is duty times the time, and what the running period is ahead of that.
         on = p.duty * (last - first) + p.period * (_ahead(last / p.period, p.duty) - _ahead(first / p.period, p.duty))
-        return Effect(1.0 - p.loss * _whole(on / dt))
+        return Effect(1.0 - p.loss * rounded_share(on / dt))
 
 
 def _ahead(turns: Scalar, duty: Scalar) -> Scalar:

@@ -30,7 +30,7 @@ from rotorfault.base.config import Strict
 from rotorfault.base.number_rule import plain_number
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar, maximum, sqrt
-from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT
+from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, TimeGrid
 from rotorfault.model.signals import State
 from rotorfault.model.slot import Slot, register
 
@@ -48,6 +48,8 @@ class Contact(NamedTuple):
 
 class Ground(Block[State, Contact, MemoryT, ParametersT]):
     """Ground to stand on: a function of the true motion, asked for by the integrator."""
+
+    limits_grid = True
 
     def contact(self, state: State, parameters: ParametersT) -> Contact:
         """Force and torque on the vehicle.
@@ -71,6 +73,12 @@ class Ground(Block[State, Contact, MemoryT, ParametersT]):
     def longest_step(self) -> float:
         """Integration step in s up to which contact is stable with room to spare."""
         return LARGEST_STEP
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Steps that are too long for contact."""
+        if grid.step <= (longest := self.longest_step()) * (1.0 + 1e-9):
+            return None
+        return "", f"got {grid.step:g} s; allowed with this ground: up to {longest:g} s, for contact is stiff"
 
 
 def _level(value: Any) -> Any:

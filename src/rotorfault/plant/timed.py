@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.scalar import Scalar, clip
 from rotorfault.model.block import Block, MemoryT, Nothing, OutputT, ParametersT, Record
 
 LONGEST_STEP = 0.001  # s: integration step of a scenario that gives none; attitude moves in tens of milliseconds
+_ROUNDING = 1e-6  # of an integration step: a share that differs by less from none or all of it is that
 
 
 class TimeInputs(NamedTuple):
@@ -42,3 +43,13 @@ class Timed(Block[TimeInputs, OutputT, MemoryT, ParametersT]):
     ) -> tuple[MemoryT, OutputT, Record]:
         """Memory of the sampling period that begins, and the output at its beginning."""
         return memory, self.at(inputs.time, memory, parameters), Nothing()
+
+
+def share_since(time: Scalar, dt: Scalar, start: Scalar) -> Scalar:
+    """Share of the step of length `dt` from `time` on that is not before `start`; all in s."""
+    return rounded_share((time + dt - start) / dt)
+
+
+def rounded_share(share: Scalar) -> Scalar:
+    """A share of a step, 0 and 1 where it is that but for rounding."""
+    return clip((share - _ROUNDING) * (1.0 / (1.0 - 2.0 * _ROUNDING)), 0.0, 1.0)

@@ -25,6 +25,7 @@ from rotorfault.base.angles import TURN, Radians
 from rotorfault.base.config import Strict, read_text, refusal
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
+from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import register
 from rotorfault.reference.csv_table import read_table
 from rotorfault.reference.protocol import ReferenceSource, ReferenceTable, stacked
@@ -68,6 +69,8 @@ class Waypoint(Strict):
 class Waypoints(ReferenceSource):
     """Points to be at rest in at given times, minimum-jerk motion between them."""
 
+    limits_grid = True
+
     class Settings(Strict):
         """Which points."""
 
@@ -88,6 +91,18 @@ class Waypoints(ReferenceSource):
         """From the first to the last point; one point alone is held for ever."""
         points = self.settings.points
         return (points[0].time, points[-1].time) if len(points) > 1 else None
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Ways that are over before the autopilot has seen one instant of them."""
+        least = 2.0 * grid.period * (1.0 - 1e-9)
+        for number in range(1, len(self.settings.points)):
+            a, b = self.settings.points[number - 1], self.settings.points[number]
+            if b.time - a.time < least and (a.position, a.yaw) != (b.position, b.yaw):
+                return f"points.{number}.time", (
+                    f"got {b.time!r} s, {b.time - a.time:.4g} s after the waypoint before; allowed: two sampling "
+                    f"periods after it or more, {2.0 * grid.period:g} s; give it more time, or a shorter period"
+                )
+        return None
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -112,6 +127,8 @@ class Waypoints(ReferenceSource):
 class Sinusoid(ReferenceSource):
     """offset + amplitude sin(frequency t + phase) on each axis, yaw constant."""
 
+    limits_grid = True
+
     class Settings(Strict):
         """The three sines, in the order x, y, z."""
 
@@ -122,6 +139,17 @@ class Sinusoid(ReferenceSource):
         )
         offset: Triple = Field(default=(0.0, 0.0, 0.0), description="Centre of x, y, z [m]")
         yaw: Heading = Field(default=0.0, description="Yaw angle [rad]")
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Sines above half the sampling rate."""
+        most = math.pi / grid.period
+        for axis, (omega, amplitude) in enumerate(zip(self.settings.frequency, self.settings.amplitude, strict=True)):
+            if amplitude != 0.0 and abs(omega) > most:
+                return f"frequency.{axis}", (
+                    f"got {omega:g} rad/s; allowed: below {most:.4g} rad/s, half the rate of sampling every "
+                    f"{grid.period:g} s; a slower sine, or a shorter period"
+                )
+        return None
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""
@@ -140,6 +168,8 @@ class Sinusoid(ReferenceSource):
 class Square(ReferenceSource):
     """Square waves through a first-order filter, on each axis and on yaw."""
 
+    limits_grid = True
+
     class Settings(Strict):
         """The four filtered square waves. They start at +amplitude, the filters at 0."""
 
@@ -152,6 +182,18 @@ class Square(ReferenceSource):
         feed_forward: bool = Field(
             default=False, description="Pass on the filters' accelerations; else the reference says 0 [-]"
         )
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """Waves that switch more often than once in a sampling period."""
+        s, least = self.settings, 2.0 * grid.period
+        waves = [(f"period.{axis}", *wave) for axis, wave in enumerate(zip(s.period, s.amplitude, strict=True))]
+        for key, period, amplitude in (*waves, ("yaw_period", s.yaw_period, s.yaw_amplitude)):
+            if amplitude != 0.0 and period < least * (1.0 - 1e-9):
+                return key, (
+                    f"got {period:g} s; allowed: at least {least:g} s, two periods of sampling; a slower wave, or a "
+                    "shorter sampling period"
+                )
+        return None
 
     def table(self, times: Array) -> ReferenceTable:
         """The reference at the given instants; see `ReferenceSource.table`."""

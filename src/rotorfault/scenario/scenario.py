@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
+from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.response import ON_FAULT
 from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, TURN, Radians
 from rotorfault.base.config import Strict, Three, passed_on, refusal, validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
+from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
@@ -28,9 +30,11 @@ from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.part import Part, field_of
 from rotorfault.scenario.slots import SLOTS
+from rotorfault.scenario.time_grid import require_flyable, require_on_grid
 
 B = TypeVar("B")
 
+ROUNDING = 1e-12  # relative, of a time over another
 PERIOD_TOLERANCE = 1e-9  # relative: how exactly the step must divide the sampling period
 MOST_SUBSTEPS = 1000  # per sampling period
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
@@ -75,16 +79,22 @@ class Mismatch(Strict):
     rotor_gain: Factor = 1.0
     linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
 
-    def applied(self, vehicle: Vehicle) -> Vehicle:
-        """The true vehicle for a believed one."""
-        J, (x, y, z) = vehicle.inertia, self.inertia
-        return vehicle._replace(
-            mass=vehicle.mass * self.mass,
-            inertia=type(J)(J.x * x, J.y * y, J.z * z),
-            rotor_bandwidth=vehicle.rotor_bandwidth * self.rotor_bandwidth,
-            rotor_gain=vehicle.rotor_gain * self.rotor_gain,
-            linear_drag=vehicle.linear_drag * self.linear_drag,
-        )
+    def applied(self, vehicle: VehicleFile) -> Vehicle:
+        """The true vehicle for a believed one.
+
+        Raises
+        ------
+        PydanticCustomError
+            If there is no such vehicle: it keeps the rules of a vehicle file.
+        """
+        x, y, z = self.inertia
+        factors = {name: getattr(self, name) for name in ("mass", "rotor_bandwidth", "rotor_gain", "linear_drag")}
+        factors |= {"inertia_x": x, "inertia_y": y, "inertia_z": z}
+        try:
+            return vehicle.with_factors(factors).vehicle
+        except PydanticCustomError as error:
+            about = error.context or {}
+            raise refusal("mismatch", f"the true vehicle: {about.get('key')}: {error.message()}") from None
 
 
 def _vehicle(value: Any) -> VehicleFile:
@@ -154,13 +164,16 @@ class Scenario(Strict):
             )
         if self.maybe(GROUND) is None and getattr(self[ON_FAULT].factory, "lands", False):
             raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
-        if (ground := self.maybe(GROUND)) is not None:
-            step, longest = self.period / self.substeps, ground.make().longest_step()
-            if step > longest * (1.0 + PERIOD_TOLERANCE):
-                allowed = f"allowed with this ground: up to {longest:g} s, for contact is stiff"
-                raise refusal("step", f"got {step:g} s; {allowed}")
-        if self.duration < self.period:
+        if self.duration < self.period * (1.0 - PERIOD_TOLERANCE):
             raise refusal("duration", f"got {self.duration:g} s; allowed: at least one period, {self.period:g} s")
+        if not _divides(self.period, self.duration):
+            few = math.floor(self.duration / self.period)
+            near = " or ".join(f"{round(n * self.period, 12):.12g}" for n in (few, few + 1))
+            raise refusal(
+                "duration",
+                f"got {self.duration:.12g} s, {self.duration / self.period:.12g} periods; allowed: whole periods of "
+                f"{self.period:g} s, such as {near} s",
+            )
         if not self.duration / self.period < 5e7:
             raise refusal(
                 "duration",
@@ -176,7 +189,19 @@ class Scenario(Strict):
                 f"{self.steps / self.every:.3g} records take more memory than there is; allowed: up to "
                 f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
             )
+        require_flyable(self.mismatch.applied(self.vehicle), self.grid)
+        for slot in SLOTS:
+            if slot.many:
+                for number, part in enumerate(self.all(slot)):
+                    require_on_grid(part, f"{slot.name}.{number}", self.grid)
+            elif (one := self.maybe(slot)) is not None:
+                require_on_grid(one, slot.name, self.grid)
         return self
+
+    @property
+    def grid(self) -> TimeGrid:
+        """The instants at which it is computed."""
+        return TimeGrid(self.period, self.period / self.substeps)
 
     @property
     def substeps(self) -> int:
@@ -201,6 +226,32 @@ class Scenario(Strict):
         return {key: value for key, value in data.items() if value is not None}
 
 
+def true_vehicle(vehicle: VehicleFile, mismatch: Mismatch, grid: TimeGrid, where: str) -> Vehicle:
+    """The true vehicle of a flight.
+
+    Parameters
+    ----------
+    vehicle : VehicleFile
+        As the autopilot believes it to be.
+    mismatch : Mismatch
+    grid : TimeGrid
+    where : str
+        For messages.
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle, or the time grid cannot carry it.
+    """
+    try:
+        true = mismatch.applied(vehicle)
+        require_flyable(true, grid)
+    except PydanticCustomError as error:
+        key = (error.context or {}).get("key")
+        raise InputError(": ".join(word for word in (where, key, error.message()) if word)) from None
+    return true
+
+
 def _divides(small: float, large: float) -> bool:
     ratio = large / small
     return ratio >= 1.0 - PERIOD_TOLERANCE and abs(ratio - round(ratio)) <= PERIOD_TOLERANCE * ratio
@@ -208,7 +259,7 @@ def _divides(small: float, large: float) -> bool:
 
 def substeps_of(period: float) -> int:
     """Integration steps in a sampling period [s] of a scenario that gives none: of 1 ms at most."""
-    return max(1, math.ceil(period / LONGEST_STEP * (1.0 - PERIOD_TOLERANCE)))
+    return max(1, math.ceil(period / LONGEST_STEP * (1.0 - ROUNDING)))
 
 
 def scenario_from(tables: Mapping[str, Any], where: str, allow_code: bool | Collection[str] = False) -> Scenario:

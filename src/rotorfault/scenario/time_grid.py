@@ -1,0 +1,94 @@
+r"""What the time grid of a flight cannot carry: one check for every door (files, overrides, columns of many flights).
+
+The plant is integrated by Runge-Kutta steps of length h, everything else is held over a sampling period. A motion
+that is over within a step is flown wrong, or not at all, and the controller would get the blame. So the true vehicle,
+after `mismatch`, keeps to (all our choice, far inside the region in which the step is stable, which ends at 2.8)
+
+.. math:: \frac{k_d}{m}h \le \frac12, \qquad \frac{J_r\Omega}{\sqrt{J_xJ_y}}h \le 1, \qquad
+          \frac{\tau_{max}}{J}h^2 \le \frac12\,\mathrm{rad}, \qquad \frac{F_{max}}{m}h^2 \le 1\,\mathrm{m}
+
+with the greatest torque, thrust and residual speed that its rotors give. Parts say themselves what they need
+(`rotorfault.model.block.Block.off_grid`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rotorfault.base.config import refusal
+from rotorfault.model.block import TimeGrid
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.scenario.part import Part
+
+FASTEST_DECAY = 0.5  # of 1 / step: then the step is right to 0.03 % of what decays
+FASTEST_PRECESSION = 1.0  # of 1 / step: with one pair of rotors at full thrust and the other at none, so seldom met
+FARTHEST_TURN = 0.5  # rad in a step, from rest
+FARTHEST = 1.0  # m in a step, from rest
+_ROOM = 1e-9  # relative: a step that is one that was named here is allowed
+
+
+def require_flyable(vehicle: Vehicle, grid: TimeGrid) -> None:
+    """Refuse a true vehicle that moves faster than the integration step can follow.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The true one, on floats.
+    grid : TimeGrid
+
+    Raises
+    ------
+    PydanticCustomError
+        With the number, and the step that would do.
+    """
+    J, thrust = vehicle.inertia, vehicle.rotor_gain * vehicle.thrust_max
+    lever = [sum(map(abs, vehicle.rotor_y)) / 2.0, sum(map(abs, vehicle.rotor_x)) / 2.0, 2.0 * vehicle.torque_ratio]
+    speed = 2.0 * math.sqrt(thrust / vehicle.thrust_coefficient)
+    turning = max(_over(arm * thrust, moment) for arm, moment in zip(lever, J, strict=True))
+    decay, pushed = _over(vehicle.linear_drag, vehicle.mass), _over(4.0 * thrust, vehicle.mass)
+    precession = _over(vehicle.rotor_inertia * speed, math.sqrt(J.x) * math.sqrt(J.y))
+    found = (
+        (f"its drag over mass is {decay:.4g} 1/s", _most(FASTEST_DECAY, decay)),
+        (f"its rotors make it precess at up to {precession:.4g} rad/s", _most(FASTEST_PRECESSION, precession)),
+        (f"its rotors turn it by up to {turning:.4g} rad/s^2", math.sqrt(_most(FARTHEST_TURN, turning))),
+        (f"its rotors push it by up to {pushed:.4g} m/s^2", math.sqrt(_most(FARTHEST, pushed))),
+    )
+    told, longest = min(found, key=lambda one: one[1])
+    if not grid.step <= longest * (1.0 + _ROOM):
+        raise refusal(
+            "step",
+            f"got {grid.step:.4g} s; allowed for the true vehicle: up to {longest:.4g} s, for {told}; "
+            "give a shorter step, or check mass, inertia, drag and mismatch",
+        )
+
+
+def require_on_grid(part: Part[Any], key: str, grid: TimeGrid) -> None:
+    """Refuse a part that the time grid cannot carry.
+
+    Parameters
+    ----------
+    part : Part
+    key : str
+        Its dotted key in the scenario.
+    grid : TimeGrid
+
+    Raises
+    ------
+    PydanticCustomError
+        With the number, and what would do.
+    """
+    if part.slot.side == "belief" or not getattr(part.factory, "limits_grid", False):
+        return
+    wrong = part.make().off_grid(grid)
+    if wrong is not None:
+        setting, message = wrong
+        raise refusal(f"{key}.{setting}" if setting else "step", message)
+
+
+def _over(a: float, b: float) -> float:
+    return a / b if b > 0.0 else math.inf
+
+
+def _most(share: float, rate: float) -> float:
+    return share / rate if rate > 0.0 else math.inf
