@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -14,7 +13,9 @@ from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
 from rotorfault.results.score_table import nested
+from rotorfault.results.seal import sealed
 from rotorfault.results.text import summary_text
+from rotorfault.results.whole import require_whole
 from rotorfault.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ class Flight:
             If the folder does not exist.
         """
         path = Path(path)
-        write_netcdf(self._arrays(), path)
+        write_netcdf(sealed(self._arrays()), path)
         return path
 
     def write(self, folder: str | Path, with_figures: bool = True) -> list[Path]:
@@ -160,10 +161,11 @@ def load(path: str | Path) -> Flight:
     Raises
     ------
     InputError
-        If the file is missing, truncated or no flight, lacks a signal, or is of an older version.
+        If the file is missing, truncated or no flight, is not what was written, lacks something or has it in another
+        form, or is of an older version.
     """
     from rotorfault.results import dataset
 
-    data = dataset.complete(dataset.read_netcdf(path), path)
-    scores = {name: math.nan if value is None else value for name, value in dataset.scores(data, path).items()}
+    data = dataset.read_netcdf(path)
+    scores = require_whole(dataset.as_flight_data(data), path)
     return Flight(data, Outcome(str(data.attrs["outcome"]), float(data.attrs["end_time"])), scores)

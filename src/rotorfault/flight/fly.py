@@ -171,7 +171,7 @@ def _without_presets(tables: dict[str, Any]) -> None:
     """Say of a scenario's complete tables that they come from no preset that is known: older files name none."""
     for slot in SLOTS:
         part = tables.get(slot.name)
-        if slot.presets is not None and isinstance(part, dict) and slot.presets(part["kind"]):
+        if slot.presets is not None and isinstance(part, dict) and slot.presets(str(part.get("kind"))):
             part.setdefault("preset", NO_PRESET)
 
 

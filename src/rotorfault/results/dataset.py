@@ -6,7 +6,6 @@ that a flight can be repeated from its file alone.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,14 +14,12 @@ import h5netcdf
 import xarray as xr
 
 from rotorfault.base.errors import InputError
-from rotorfault.loop.recorded import LoopSignals
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
+from rotorfault.results.seal import DIGESTS, changed_attributes, changed_variables
+from rotorfault.results.whole import json_table
 
 OLD_FORMAT = "rotorfault-flight-1"
 Content = TypeVar("Content")
-
-ATTRIBUTES = ("scenario", "controller", "plant", "engine", "seed", "version", "outcome", "end_time", "scores")
-"""Attributes that the summary of a flight needs."""
 
 
 def as_dataset(data: FlightData) -> xr.Dataset:
@@ -63,7 +60,23 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         )
     if form != FORMAT:
         raise InputError(f"{path}: attribute 'format' is {form!r}; allowed: '{FORMAT}'")
+    _require_unchanged(data.attrs, path)
+    if changed := changed_variables(as_flight_data(data)):
+        more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
+        raise InputError(
+            f"{path}: signal '{changed[0]}'{more} is not what was written: the file is damaged or was edited; "
+            "'rotorfault fly --repeat' flies it again"
+        )
+    data.attrs.pop(DIGESTS, None)  # whoever changes the data and saves them gets new ones
     return data
+
+
+def _require_unchanged(attributes: Mapping[str, Any], path: str | Path) -> None:
+    if changed_attributes(attributes):
+        raise InputError(
+            f"{path}: its attributes are not what was written: the file is damaged or was edited; restore it from a "
+            "copy, or fly the scenario anew"
+        )
 
 
 def _from(path: Path, read: Callable[[Path], Content]) -> Content:
@@ -101,40 +114,14 @@ def read_configuration(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]
     attributes = _from(Path(path), _attributes)
     if attributes.get("format") not in (FORMAT, OLD_FORMAT):
         raise InputError(f"{path}: attribute 'format' is {attributes.get('format')!r}; allowed: '{FORMAT}'")
+    _require_unchanged(attributes, path)
+    if not isinstance(attributes.get("engine"), str):
+        raise InputError(
+            f"{path}: attribute 'engine' is {attributes.get('engine')!r}; allowed: the name of an engine"
+        )
     return configuration(attributes, path), attributes
-
-
-def complete(data: xr.Dataset, path: str | Path) -> xr.Dataset:
-    """The same dataset, if it has all signals and attributes that the numbers of a flight are computed from.
-
-    Raises
-    ------
-    InputError
-        If one is missing.
-    """
-    hint = "fly it again with 'rotorfault fly --repeat'"
-    for name in LoopSignals._fields:
-        if name not in data.data_vars:
-            raise InputError(f"{path}: signal '{name}' is missing; {hint}")
-    for name in ATTRIBUTES:
-        if name not in data.attrs:
-            raise InputError(f"{path}: attribute '{name}' is missing; {hint}")
-    return data
 
 
 def configuration(attributes: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
     """The scenario's tables that a flight file holds."""
-    try:
-        tables: dict[str, Any] = json.loads(attributes["configuration"])
-    except (KeyError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: attribute 'configuration' is missing or damaged ({error})") from None
-    return tables
-
-
-def scores(data: xr.Dataset, path: str | Path) -> dict[str, Any]:
-    """The numbers that were counted in flight, as a flight file holds them; None for what has none."""
-    try:
-        numbers: dict[str, Any] = json.loads(data.attrs["scores"])
-    except (KeyError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: attribute 'scores' is missing or damaged ({error})") from None
-    return numbers
+    return json_table(attributes, "configuration", path)

@@ -99,7 +99,7 @@ def flight_data(layout: Layout, signals: Array, times: Array, attributes: dict[s
     """
     variables: dict[str, Variable] = {}
     for signal in layout.signals:
-        dims, shape = _shape(signal.kind, signal.quantity.frame == RPY)
+        dims, shape = shape_of(signal.kind, signal.quantity.frame == RPY)
         about = {"units": signal.quantity.unit, "long_name": signal.quantity.meaning}
         if signal.quantity.frame:
             about["frame"] = signal.quantity.frame
@@ -121,7 +121,16 @@ def _coordinates(times: Array) -> dict[str, Variable]:
     }
 
 
-def _shape(kind: Any, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
+def shape_of(kind: Any, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Names and sizes of the dimensions of a signal, besides the time.
+
+    Parameters
+    ----------
+    kind : type
+        Of the signal.
+    angular : bool
+        Whether its components are angles for people.
+    """
     if kind is Vec3:
         return ("angle" if angular else "axis",), (3,)
     if kind is Quat:
