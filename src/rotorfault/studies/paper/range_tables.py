@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rotorfault.base.text_table import table_lines
 from rotorfault.studies.paper.cases import CASES
-from rotorfault.studies.paper.ranges import LAWS, Cell, Flown, Gains
+from rotorfault.studies.paper.ranges import FULL, LAWS, Cell, Flown, Gains, cells
 from rotorfault.studies.paper.verdicts import MARGIN, below
 from rotorfault.tuning.space import BOXES
 from rotorfault.tuning.training import OBJECTIVES
@@ -114,7 +114,8 @@ def headline(found: Sequence[Pair]) -> str:
     won = sum(ratio < 1.0 for ratio in known)
     clear = sum(below(ratio, 1.0) for ratio in known)
     return (
-        f"ROISMC's cost is the lower one in {won} of {len(known)} comparisons, by {MARGIN:.0%} or more in {clear}. "
+        f"These are {len(found)} pairs of gains, of the {len(cells(FULL.seeds))} that `rotorfault ranges` searches. "
+        f"ROISMC's cost is the lower one in {won} of {len(known)} comparisons, by {100 * MARGIN:g} % or more in {clear}. "
         f"How much lower is a matter of the search: {span(known)} over all cases."
     )
 
