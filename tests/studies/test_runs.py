@@ -37,7 +37,7 @@ def test_summary_only_runs_keep_no_flight(tmp_path: Path) -> None:
         result.data()
 
 
-@pytest.mark.parametrize("damage", ["overrides", "label", "record", "flight"])
+@pytest.mark.parametrize("damage", ["overrides", "label", "record", "number", "flight", "signal"])
 def test_what_changed_or_is_damaged_is_flown_anew(damage: str, tmp_path: Path) -> None:
     RunStore(tmp_path).get(ONE)
     run, store = ONE, RunStore(tmp_path)
@@ -47,6 +47,12 @@ def test_what_changed_or_is_damaged_is_flown_anew(damage: str, tmp_path: Path) -
         store = RunStore(tmp_path, None, "2")
     elif damage == "record":
         (tmp_path / "runs" / "one.json").write_text('{"digest": "half')
+    elif damage == "number":
+        record = tmp_path / "runs" / "one.json"
+        record.write_text(record.read_text().replace('"cost": ', '"cost": 1'))
+    elif damage == "signal":
+        flight = tmp_path / "flights" / "one.nc"
+        flight.write_bytes(flight.read_bytes()[:-1] + b"x")
     else:
         (tmp_path / "flights" / "one.nc").unlink()
     assert store.find(run) is None

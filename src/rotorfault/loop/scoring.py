@@ -4,23 +4,14 @@ Pure functions on scalars, so that every engine counts alike, a batch of a hundr
 and a flight has one set of numbers whatever of it is recorded and how finely.
 
 - *Outcome*: ``diverged`` (a number of the true state is not finite, or it is further than 10 km away), ``tumbled``
-<<<<<<< HEAD
   (tilt beyond 90 degrees) or ``ground`` (crash: touched the ground faster than 1 m/s down or 0.5 m/s sideways, or
   tilted beyond 15 degrees, or sank into it by the length of its legs) end a flight; so does ``landed`` (touched it
   more gently than that in a landing, and stood there with rotors stopped for 0.5 s). It touches where the ground
-  pushes it up with 1 % of its weight or more. A flight that lasts to its end is
-  ``settled`` (constant reference, within 2 % of the step at the end), ``tracked`` (moving reference, root mean square
-  error over the last half within 5 % of the reference's span on every axis) or ``offset`` (neither). It has
-  *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is ``interrupted``.
-=======
-  (tilt beyond 90 degrees) or ``ground`` (crash: below the ground without a landing under way, or touched it during a
-  landing faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees) end a flight; so does ``landed``
-  (touched it more gently than that, and stood there with rotors stopped for 0.5 s). A flight that lasts to its end is
-  ``settled`` (constant reference, within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference
-  that moves or turns, root mean square errors over the last half within 5 % of the reference's span on every axis
-  and 0.1 rad of yaw) or ``offset`` (neither). It has *survived* unless it diverged, tumbled or crashed. A flight that
-  somebody ended before is ``interrupted``.
->>>>>>> 51a388e (Track attitude on SO(3), feed the yaw rate forward, and let outcomes see yaw)
+  pushes it up with 1 % of its weight or more. A flight that lasts to its end is ``settled`` (constant reference,
+  within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference that moves or turns, root mean square
+  errors over the last half within 5 % of the reference's span on every axis and 0.1 rad of yaw) or ``offset``
+  (neither). It has *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is
+  ``interrupted``.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
 - *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from rotorfault.base.errors import InputError
-from rotorfault.base.files import write_atomically
+from rotorfault.base.files import read_plain, write_atomically
 from rotorfault.base.versions import source_digest
 from rotorfault.flight.flight import load
 from rotorfault.flight.fly import fly
@@ -103,13 +103,13 @@ class RunStore:
         digest = self._digest(run, run.load() if scenario is None else scenario)
         try:
             content = json.loads(self._record(run).read_text(encoding="utf-8"))
-            if content["digest"] != digest:
+            if content["digest"] != digest or content.pop("seal") != _seal(content):
                 return None
             path = self.folder / "flights" / f"{run.id}.nc" if run.keep else None
-            if path is not None and not path.is_file():
+            if path is not None and hashlib.sha256(read_plain(path)).hexdigest() != content["flight"]:
                 return None
             return Result(run, content["summary"], content["extra"], float(content["seconds"]), path)
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None  # missing or damaged: flown anew
 
     def _fly(self, run: Run, scenario: Scenario) -> Result:
@@ -124,7 +124,9 @@ class RunStore:
             flight.save(path)
         digest = self._digest(run, scenario)
         content = {"digest": digest, "summary": flight.summary(), "extra": extra, "seconds": seconds}
-        text = json.dumps(content, indent=1, allow_nan=False)
+        if path is not None:
+            content["flight"] = hashlib.sha256(path.read_bytes()).hexdigest()
+        text = json.dumps({**content, "seal": _seal(content)}, indent=1, allow_nan=False)
         # After the flight's own file: there must be no record without its flight.
         write_atomically(self._record(run), lambda temporary: temporary.write_text(text, encoding="utf-8"))
         self.flown += 1
@@ -136,3 +138,8 @@ class RunStore:
     def _digest(self, run: Run, scenario: Scenario) -> str:
         words = [source_digest(), self._label, str(run.keep), json.dumps(scenario.as_tables(), sort_keys=True)]
         return hashlib.sha256("\n".join(words).encode()).hexdigest()
+
+
+def _seal(content: dict[str, Any]) -> str:
+    """Of a record as JSON holds it: one that was edited or damaged is flown anew."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
