@@ -115,7 +115,8 @@ def headline(found: Sequence[Pair]) -> str:
     clear = sum(below(ratio, 1.0) for ratio in known)
     return (
         f"These are {len(found)} pairs of gains, of the {len(cells(FULL.seeds))} that `rotorfault ranges` searches. "
-        f"ROISMC's cost is the lower one in {won} of {len(known)} comparisons, by {100 * MARGIN:g} % or more in {clear}. "
+        f"ROISMC's cost is the lower one in {won} of {len(known)} comparisons, by {100 * MARGIN:g} % or more in "
+        f"{clear}. "
         f"How much lower is a matter of the search: {span(known)} over all cases."
     )
 
