@@ -8,8 +8,8 @@ and a flight has one set of numbers whatever of it is recorded and how finely.
   tilted beyond 15 degrees, or sank into it by the length of its legs) end a flight; so does ``landed`` (touched it
   more gently than that in a landing, and stood there with rotors stopped for 0.5 s). It touches where the ground
   pushes it up with 1 % of its weight or more. A flight that lasts to its end is ``settled`` (constant reference,
-  within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference that moves or turns, root mean square
-  errors over the last half within 5 % of the reference's span on every axis and 0.1 rad of yaw) or ``offset``
+  within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference that moves or turns, root mean
+  square errors over the last half within 5 % of the reference's span on every axis and 0.1 rad of yaw) or ``offset``
   (neither). It has *survived* unless it diverged, tumbled or crashed. A flight that somebody ended before is
   ``interrupted``.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
