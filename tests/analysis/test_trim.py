@@ -13,6 +13,7 @@ from spring import Spring, SpringBlock
 from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.analysis.linearisation import AXES, LinearLoop, linearise
 from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.roughness import why_rough
 from rotorfault.analysis.trim import TrimReport, hover, hover_loop, trim_report
 from rotorfault.autopilot.control.python_controller import PythonController
 from rotorfault.base.errors import InputError
@@ -21,6 +22,7 @@ from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.signals import Command, Estimate, Reference, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.scenario.library import load_scenario
 
 T = 0.002
@@ -166,11 +168,40 @@ def test_switching_without_derivative_is_refused(paper_vehicle: Vehicle) -> None
     kind = CONTROLLERS["smc"]
     law = kind.Settings().law.model_copy(update={"switching": "discontinuous"})
     controller = kind(kind.Settings(law=law))
-    with pytest.raises(InputError, match="no derivative"):
+    with pytest.raises(
+        InputError, match=r"no derivative in hover; law.switching = 'discontinuous' jumps; choose 'smooth'"
+    ):
         linearise(*hover_loop(paper_vehicle, controller, T))
     report = trim_report(paper_vehicle, controller, period=T)
     assert report.linear is None
     assert "no derivative" in report.text()
+    assert "Margins: none, the loop has no linearisation" in report.text()
+
+
+def test_a_rotor_at_its_limit_is_told_and_no_setting_that_is_made_already(paper_vehicle: Vehicle) -> None:
+    """A yaw torque of next to nothing for each newton: the least deviation asks a rotor for all that it has."""
+    weak = paper_vehicle._replace(torque_ratio=1e-7)
+    (reason,) = [line for line in trim_report(weak, "smc", period=T).warnings if "no derivative" in line]
+    assert (
+        "drives a rotor to its limit (0 to 8.68 N), for lack of torque about yaw: hover leaves 1.74e-06 N m" in reason
+    )
+    assert "smooth" not in reason
+    # Of a vehicle that hovers at full thrust: asked for the wrench of hover, and for a little more.
+    heavy = paper_vehicle._replace(thrust_max=paper_vehicle.mass * paper_vehicle.gravity / 4.0)
+    asked = np.array([[heavy.mass * heavy.gravity], [0.0], [0.0], [0.0]])
+    reason = why_rough([], heavy, asked, asked, "x", 1e-5)
+    assert reason.startswith("in hover the command of rotor 1, 2, 3, 4 is at its limit (0 to 4.34")
+    assert "otherwise than to a quarter of it" in why_rough([], paper_vehicle, asked, asked, "x", 1e-5)
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_trim_warns_of_a_vehicle_by_its_numbers_alone(name: str) -> None:
+    vehicle = load_vehicle(name).vehicle
+    assert not [line for line in trim_report(vehicle, "smc").warnings if "hover leaves" in line]
+    y = 2.0 * vehicle.inertia.x / (vehicle.mass * vehicle.gravity)  # turns the vehicle with 2 rad/s^2
+    thin = vehicle._replace(rotor_x=PerRotor(0.22, -0.22, 0.22, -0.22), rotor_y=PerRotor(y, -y, -y, y))
+    (line,) = [line for line in trim_report(thin, "smc").warnings if line.startswith("roll: hover leaves")]
+    assert f"{hover(thin).torque_max.x / thin.inertia.x:.3g} rad/s^2 (lever {1e3 * y:.3g} mm" in line
 
 
 class Hoarder(Spring):

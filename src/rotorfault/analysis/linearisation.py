@@ -27,6 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.analysis.roughness import limit_in_hover, why_rough
 from rotorfault.base.errors import InputError
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
 from rotorfault.maths.arrays import Array, Complex
@@ -251,12 +252,16 @@ def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = 
         x = x.copy()
         x[kept] += np.linalg.lstsq(np.eye(len(kept)) - A[np.ix_(kept, kept)], change[kept], rcond=None)[0]
     if not residual <= 1e-6:
-        raise InputError(f"the loop does not come to rest in hover (it still changes by {residual:.2g} a period)")
+        reason = limit_in_hover(flight.vehicle, flight.advance(x)[1])
+        told = f"the loop does not come to rest in hover (it still changes by {residual:.2g} a period)"
+        raise InputError(f"{told}; {reason}" if reason else told)
     finer = _jacobian(flight, x, STEP / 4.0)[0]
     inner = np.ix_(kept, kept)
-    if not np.max(np.abs(A - finer)[inner] / (1.0 + np.abs(A[inner]))) <= ROUGH:
-        raise InputError("the loop has no derivative in hover; choose switching = 'smooth'")
     names = leaf_names(flight.template)
+    rough = np.abs(A - finer)[inner] / (1.0 + np.abs(A[inner]))
+    if not np.max(rough) <= ROUGH:
+        worst = names[kept[int(np.argmax(np.nan_to_num(rough.max(axis=0), nan=math.inf)))]]
+        raise InputError(f"the loop has no derivative in hover; {_reason(flight, x, kept, worst)}")
     return LinearLoop(
         A=A[inner],
         B=_input(flight, x)[kept],
@@ -266,6 +271,13 @@ def linearise(loop: ClosedLoop, parameters: LoopParameters, keep_belief: bool = 
         left_out=tuple(name for i, name in enumerate(names) if i not in set(kept)),
         residual=residual,
     )
+
+
+def _reason(flight: _Flight, x: Array, kept: list[int], name: str) -> str:
+    d = np.diag(STEP * _scale(x)[:, 0])[:, kept]
+    deviated = np.concatenate([flight.advance(x + change)[1] for change in (d, -d)], axis=1)
+    parts = [part for _, part in flight.loop.each()]
+    return why_rough(parts, flight.vehicle, flight.advance(x)[1], deviated, name, STEP)
 
 
 class _Flight:

@@ -32,6 +32,7 @@ from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.signals import Wrench
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import substeps_of
@@ -100,18 +101,8 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         attitude=attitude_for(force_W, 1.0, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
         thrust_margin=4.0 * k * vehicle.thrust_max / needed,
-        torque_max=Vec3.of(_most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
+        torque_max=Vec3.of(most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
     )
-
-
-def _most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:
-    """Largest torque in N m either way about an axis before a rotor reaches a limit; 0 if one is beyond it."""
-    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
-    change = nominal_inverse(vehicle, Wrench(0.0, axis_B))
-    # Rotors that give no torque about the axis do not limit it.
-    least = 1e-9 * max(abs(c) for c in change)
-    room = [min(high - f, f - low) / abs(c) for f, c in zip(thrust, change, strict=True) if abs(c) > least]
-    return float(max(0.0, min(room)))
 
 
 def hover_loop(
@@ -185,7 +176,7 @@ def trim_report(
         block, name = part.make(), controller + ("" if preset is None else f" ({preset})")
     else:
         block, name = as_controller(controller), type(controller).__name__
-    warnings = sampled_data_check(block, numbers, period)
+    warnings = [*vehicle_warnings(numbers), *sampled_data_check(block, numbers, period)]
     linear, axis_margins = None, {}
     try:
         linear = linearise(*hover_loop(numbers, block, period))
@@ -260,7 +251,9 @@ def _pole_lines(report: TrimReport) -> list[str]:
 
 
 def _margin_lines(report: TrimReport) -> list[str]:
-    if report.linear is None or not report.linear.stable:
+    if report.linear is None:
+        return ["Margins: none, the loop has no linearisation"]
+    if not report.linear.stable:
         return ["Margins: none, the loop is not stable in hover"]
     rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
     for axis, m in report.margins.items():

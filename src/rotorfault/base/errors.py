@@ -29,6 +29,10 @@ class MissingExtraError(InputError):
     """A library that an optional capability needs is not installed."""
 
 
+class VehicleWarning(UserWarning):
+    """A vehicle's numbers are possible, but hardly meant, or hardly fit to fly."""
+
+
 def unknown(sort: str, name: object, allowed: list[str]) -> str:
     """One line for a name that does not exist: what came, what is allowed, the nearest.
 

@@ -13,11 +13,13 @@ from rotorfault.base.files import output_folder, write_atomically
 from rotorfault.base.text_table import table_lines
 from rotorfault.campaigns.studies import study_names
 from rotorfault.engine import ENGINES
+from rotorfault.model.vehicle_check import vehicle_warnings
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
 from rotorfault.plant import FAULT, PLANT
 from rotorfault.scenario.library import load_scenario, new_scenario, scenario_names
 from rotorfault.scenario.scenario import scenario_from
 from rotorfault.scenario.slots import SLOTS
+from rotorfault.scenario.vehicle_lines import vehicle_lines
 
 
 def entries() -> dict[str, dict[str, str]]:
@@ -83,8 +85,8 @@ def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
     return path
 
 
-def check(path: Path, allow_code: bool = False) -> str:
-    """Validate a file; one line about what it holds.
+def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
+    """Validate a file; one line about what it holds, and a line for each thing in it that is hardly meant.
 
     Parameters
     ----------
@@ -103,7 +105,8 @@ def check(path: Path, allow_code: bool = False) -> str:
 
         data = dataset.read_netcdf(path)
         scenario = scenario_from(dataset.configuration(data.attrs, path), str(path), allow_code)
-        return f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
+        line = f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
+        return line, vehicle_lines(scenario)
     text = read_text(path)
     if path.suffix != ".toml":
         raise InputError(f"{path}: ends in '{path.suffix}'; allowed: .toml (vehicle, scenario) or .nc (flight)")
@@ -111,13 +114,15 @@ def check(path: Path, allow_code: bool = False) -> str:
     # A vehicle has rotors and a mass, a scenario a reference and a duration; a bad file may lack some of either.
     if {"mass", "rotor", "inertia_x", "thrust_max"} & set(tables):
         vehicle = load_vehicle(path)
-        return f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
+        line = f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
+        return line, vehicle_warnings(vehicle.vehicle)
     scenario = load_scenario(path, allow_code=allow_code)
     # Compiles nothing: parts, start and reference, as a flight would have them.
     from rotorfault.flight.assembly import assemble
 
     assemble(scenario)
-    return (
+    line = (
         f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on "
         f"{scenario[PLANT].kind} flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
     )
+    return line, vehicle_lines(scenario)

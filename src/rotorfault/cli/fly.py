@@ -88,8 +88,8 @@ def _warn(scenario: Scenario) -> None:
         fault = part.make()
         onset = fault.onset(fault.parameters(Context(vehicle, scenario.period)))
         if onset >= scenario.duration:
-            text = f"fault.{number} sets in at {onset:g} s, after the end of the flight at {scenario.duration:g} s"
-            say(f"warning: {text}", err=True)
+            text = f"sets in at {onset:g} s, after the end of the flight at {scenario.duration:g} s"
+            say(f"warning: fault {number + 1} (key fault.{number}) {text}", err=True)
 
 
 def _flown(scenario: Scenario, engine: str | None) -> Flight:

@@ -67,7 +67,11 @@ def check(
         return
     if assignments:
         raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
-    say(catalogue.check(Path(file), allow_code))
+    line, warnings = catalogue.check(Path(file), allow_code)
+    doubts = {0: "", 1: ", with a warning"}.get(len(warnings), f", with {len(warnings)} warnings")
+    say(f"{line}{doubts}")
+    for warning in warnings:
+        say(f"warning: {warning}", err=True)
 
 
 @app.command()

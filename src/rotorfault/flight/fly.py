@@ -33,6 +33,7 @@ from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import NO_PRESET
 from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
 from rotorfault.scenario.slots import SLOTS
+from rotorfault.scenario.vehicle_lines import warn_of_vehicle
 
 
 def fly(
@@ -45,6 +46,8 @@ def fly(
     allow_code: bool = False,
 ) -> Flight:
     """Fly a scenario.
+
+    Warns (`rotorfault.VehicleWarning`) of a vehicle whose numbers are hardly meant.
 
     Parameters
     ----------
@@ -74,6 +77,7 @@ def fly(
     """
     named = controller if isinstance(controller, str) else None
     checked = prepare(scenario, named, settings, seed, allow_code)
+    warn_of_vehicle(checked)
     own: Own = {} if controller is None or named is not None else {CONTROLLER: as_controller(controller)}
     batch = assemble(checked, own)
     python_only = any(part.python_only for _, part in batch.loop.each())
@@ -102,6 +106,7 @@ def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list
     for scenario in scenarios:
         if not isinstance(scenario, Scenario):
             raise InputError(f"got {scenario!r}; allowed: Scenario objects, such as load_scenario(...) returns")
+        warn_of_vehicle(scenario)
     name = engine or default_engine(len(scenarios))
     batch = assemble_all(scenarios)
     recording = _run(batch, name, scenarios[0].period)

@@ -27,6 +27,7 @@ from rotorfault.maths.geometry import Vec3
 from rotorfault.model.telemetry import Layout
 from rotorfault.results.score_table import ScoreTable, score_table
 from rotorfault.scenario.scenario import Scenario
+from rotorfault.scenario.vehicle_lines import warn_of_vehicle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,6 +157,8 @@ def fly_many(
     columns = checked_columns(checked, vary)
     count = len(next(iter(columns.values())))
     groups = groups_of(checked, columns)
+    for group in groups:
+        warn_of_vehicle(group.scenario)
     layouts = [build(group.scenario).layout for group in groups] if record else []
     rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)
     width = len(rows[0])

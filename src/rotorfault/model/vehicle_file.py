@@ -168,7 +168,8 @@ class VehicleFile(Strict):
         hover = self.mass.value * self.gravity.value / (4.0 * self.rotor_gain.value)
         if not ratio > 1.0:
             message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"
-            return refusal("thrust_max", f"{message} {hover:.4g} N per rotor")
+            grams = f"; if mass is in g, write {0.001 * self.mass.value:g} kg" if 1.0 < 1e3 * ratio < 25.0 else ""
+            return refusal("thrust_max", f"{message} {hover:.4g} N per rotor{grams}")
         if not low < hover:
             return refusal(
                 "thrust_min",

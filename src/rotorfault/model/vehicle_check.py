@@ -1,0 +1,234 @@
+r"""Numbers of a vehicle that are possible but hardly meant: an axis without authority, a number in another unit.
+
+*Authority.* The largest torque about an axis, either way, that sound rotors give while they hold hover, over the
+moment of inertia, is the angular acceleration that is left to turn with. Turning by an angle :math:`\theta` and
+stopping within t takes :math:`4\theta/t^2`. With less than `LEAST` of it an axis can hardly be reached: a light wind
+takes thrust, or the other axes, away from it. The lever is the torque for each newton that is moved between rotors.
+
+*Units.* Vehicles of all sizes are alike, so numbers are judged in proportion to each other: mass by the cube of the
+arm; radii of gyration, :math:`\sqrt{J/m}`, and the torque ratio by the arm. The radius R of a rotor follows from the
+thrust coefficient, :math:`b = C_T\rho\pi R^4`, for :math:`C_T` differs little between propellers: static
+coefficients of about 0.1 in the normalisation of J. Brandt, M. Selig, "Propeller Performance Data at Low Reynolds
+Numbers", AIAA 2011-1255, are 0.012 in this one. R is judged by the arm and by the speed of its tips, the rotor's
+inertia by m R². The bounds are our choice: wide around the vehicles that are included and others that we know of,
+narrow beside a wrong unit, which is a factor of tens and more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.signals import Wrench
+from rotorfault.model.vehicle import Vehicle, hover_thrust, rotor_speeds
+
+ANGLE = 0.5  # rad, by which the least authority turns
+TIMES = Vec3(0.5, 0.5, 2.0)  # s, about roll, pitch, yaw; our choice: a gust builds up in as much, yaw can wait
+LEAST = Vec3.of(4.0 * ANGLE / t**2 for t in TIMES)  # rad/s^2
+AXES = ("roll", "pitch", "yaw")
+SPARE = 0.2  # of hover's thrust: with less to spare up or down it is thrust that an axis lacks, not its lever
+THRUST = 0.012 * 1.2 * math.pi  # kg/m^3: C_T rho pi
+
+
+def vehicle_warnings(vehicle: Vehicle) -> list[str]:
+    """What about a vehicle's numbers is hardly meant, a line each, with the number and how to mend it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Of floats, in SI units, its rotors sound.
+
+    Returns
+    -------
+    list of str
+        Empty if there is nothing.
+    """
+    units = list(_units(vehicle))
+    # Of a moment of inertia in another unit nothing more need be said.
+    said = [axis for axis, key in zip(AXES, "xyz", strict=True) if any(f"inertia_{key} =" in line for line in units)]
+    return [*units, *(line for axis, line in _authority(vehicle) if axis not in said)]
+
+
+def most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:
+    """Largest torque in N m either way about an axis before a rotor reaches a limit; 0 if one is beyond it.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Of floats, its rotors sound.
+    thrust : PerRotor, N
+        That the rotors give meanwhile.
+    axis_B : Vec3
+        Unit vector, body axes.
+    """
+    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
+    change = nominal_inverse(vehicle, Wrench(0.0, axis_B))
+    # Rotors that give no torque about the axis do not limit it.
+    least = 1e-9 * max(abs(c) for c in change)
+    room = [min(high - f, f - low) / abs(c) for f, c in zip(thrust, change, strict=True) if abs(c) > least]
+    return float(max(0.0, min(room)))
+
+
+# --------------------------------------------------------------------------------------------------------- authority
+
+
+def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
+    """Axes that can hardly be reached, each with what there is to say."""
+    hover = hover_thrust(vehicle)
+    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
+    spare = min(high - hover.r1, hover.r1 - low)
+    for name, key, moment, least, time, unit in zip(
+        AXES, "xyz", vehicle.inertia, LEAST, TIMES, (Vec3.of(row) for row in _UNITS), strict=True
+    ):
+        torque = most_torque(vehicle, hover, unit)
+        turn = torque / moment
+        if turn >= least:
+            continue
+        lever = 1.0 / math.fsum(abs(c) for c in nominal_inverse(vehicle, Wrench(0.0, unit)))
+        have = f"lever {1e3 * lever:.3g} mm, {spare:.3g} N to spare on each rotor, inertia_{key} {moment:.3g} kg m^2"
+        line = (
+            f"{name}: hover leaves an angular acceleration of {turn:.3g} rad/s^2 ({have}); turning by {ANGLE:g} rad "
+            f"within {time:g} s takes {least:g} rad/s^2, so the axis can hardly be controlled; "
+            f"{_remedy(name, spare / hover.r1)}"
+        )
+        yield name, line
+
+
+_UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def _remedy(axis: str, share: float) -> str:
+    if share < SPARE:
+        return (
+            f"hover leaves {100.0 * share:.2g} % of a rotor's thrust to spare: check mass, thrust_min and thrust_max"
+        )
+    if axis == "yaw":
+        return "check torque_ratio (drag torque over thrust, k_M / k_F) and inertia_z"
+    return "check x and y of the rotors (are their arms nearly on one line?) and the inertia"
+
+
+# ------------------------------------------------------------------------------------------------------------- units
+
+
+class _Proportion(NamedTuple):
+    """A number in proportion to others."""
+
+    key: str
+    value: float
+    unit: str
+    what: str  # the proportion in words
+    of: Callable[[float], float]  # the proportion that a value has
+    low: float
+    typical: float
+    high: float
+    meant: Mapping[str, Callable[[float], float]]  # by what the user may have written: the value in `unit`
+
+    @property
+    def fits(self) -> bool:
+        return self.low <= self.of(self.value) <= self.high
+
+    def line(self) -> str:
+        right = {
+            words: value
+            for words, convert in self.meant.items()
+            if self.low <= self.of(value := convert(self.value)) <= self.high
+        }
+        best = min(right, key=lambda words: abs(math.log(self.of(right[words]) / self.typical)), default="")
+        hint = f"if it is {best}, write {right[best]:.4g} {self.unit}" if best else "check its unit"
+        usual = f"usual {self.low:g} {f'to {self.high:g}' if math.isfinite(self.high) else 'and more'}"
+        said = f": {self.what} is {self.of(self.value):.3g}, {usual}" if self.what else f"; {usual}"
+        return f"{self.key} = {self.value:.4g} {self.unit}{said}; {hint}"
+
+
+def _times(factor: float) -> Callable[[float], float]:
+    return lambda value: factor * value
+
+
+LENGTHS = {"in mm": _times(1e-3), "in cm": _times(1e-2), "in inches": _times(0.0254)}
+INERTIAS = {
+    "in g cm^2": _times(1e-7),
+    "in kg cm^2": _times(1e-4),
+    "in kg mm^2": _times(1e-6),
+    "in g m^2": _times(1e-3),
+    "in g mm^2": _times(1e-9),
+}
+
+
+def _units(vehicle: Vehicle) -> Iterator[str]:
+    v = vehicle
+    arm = max(math.hypot(x, y) for x, y in zip(v.rotor_x, v.rotor_y, strict=True))
+    what, bounds = "mass over arm^3 [kg/m^3]", (1.0, 120.0, 5000.0)
+    mass = _Proportion("mass", v.mass, "kg", what, lambda m: m / arm**3, *bounds, {"in g": _times(1e-3)})
+    size = _Proportion("longest arm", arm, "m", what, lambda a: v.mass / a**3, *bounds, LENGTHS)
+    if not size.fits:
+        # All else is judged by mass and arm, so nothing more is said.
+        yield mass.line() if mass.of(v.mass) > mass.high else f"{size.line()} for x and y of the rotors"
+        return
+    for proportion in (*_masses(v, arm), *_rotors(v, arm)):
+        if not proportion.fits:
+            yield proportion.line()
+
+
+def _masses(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+    for axis, moment in zip("xyz", v.inertia, strict=True):
+        what = "radius of gyration, sqrt(inertia / mass), over the arm"
+        yield _Proportion(
+            f"inertia_{axis}", moment, "kg m^2", what, lambda J: math.sqrt(J / v.mass) / arm, 0.02, 0.4, 1.5, INERTIAS
+        )
+    if v.linear_drag > 0.0:
+        what = "speed of fall, m g over it [m/s],"
+        yield _Proportion(
+            "linear_drag", v.linear_drag, "N s/m", what, lambda k: v.mass * v.gravity / k, 2.0, 30.0, math.inf, {}
+        )
+    yield _Proportion("gravity", v.gravity, "m/s^2", "", lambda g: g, 1.0, 9.81, 30.0, {})
+
+
+def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+    hover = hover_thrust(v)
+
+    def radius(b: float) -> float:
+        return math.sqrt(math.sqrt(b / THRUST))
+
+    def tip(b: float) -> float:
+        return radius(b) * float(rotor_speeds(v._replace(thrust_coefficient=b), hover).r1)
+
+    per_turn = {
+        "in N/rpm^2": _times((30.0 / math.pi) ** 2),
+        "in N/krpm^2": _times((30.0 / math.pi) ** 2 * 1e-6),
+        "in N/Hz^2": _times(0.25 / math.pi**2),
+        "in gf/(rad/s)^2": _times(9.80665e-3),
+    }
+    b = v.thrust_coefficient
+    speed = float(rotor_speeds(v, hover).r1)
+    what = (
+        f"speed of the blades' tips in hover, at {speed:.4g} rad/s of blades of about {1e3 * radius(b):.3g} mm [m/s],"
+    )
+    yield _Proportion("thrust_coefficient", b, "N/(rad/s)^2", what, tip, 5.0, 50.0, 140.0, per_turn)
+    what = f"radius of the blades, about {1e3 * radius(b):.3g} mm, over the arm"
+    yield _Proportion(
+        "thrust_coefficient", b, "N/(rad/s)^2", what, lambda b: radius(b) / arm, 0.02, 0.6, 1.1, per_turn
+    )
+    ratio = {
+        "k_M in N m s^2": lambda value: value / b,
+        "k_F / k_M": lambda value: 1.0 / value,
+        "in mm": _times(1e-3),
+        "in cm": _times(1e-2),
+    }
+    what = "drag torque over thrust, k_M / k_F, over the arm"
+    yield _Proportion("torque_ratio", v.torque_ratio, "m", what, lambda kappa: kappa / arm, 0.005, 0.1, 1.0, ratio)
+    weights = v.rotor_gain * 4.0 / (v.mass * v.gravity)
+    grams = {"in gf": _times(9.80665e-3), "in mN": _times(1e-3)}
+    yield _Proportion(
+        "thrust_max", v.thrust_max, "N", "thrust-to-weight", lambda F: F * weights, 1.0, 2.5, 25.0, grams
+    )
+    lag = {"a time constant in s": lambda tau: 1.0 / tau, "a time constant in us": lambda tau: 1e6 / tau}
+    yield _Proportion("rotor_bandwidth", v.rotor_bandwidth, "rad/s", "", lambda w: w, 2.0, 30.0, 1000.0, lag)
+    yield _Proportion("rotor_gain", v.rotor_gain, "1", "thrust over command", lambda k: k, 0.1, 1.0, 10.0, {})
+    if v.rotor_inertia > 0.0:
+        disc, what = v.mass * radius(b) ** 2, "inertia of a rotor over m R^2, with R of the thrust coefficient,"
+        yield _Proportion(
+            "rotor_inertia", v.rotor_inertia, "kg m^2", what, lambda J: J / disc, 1e-6, 0.005, 0.1, INERTIAS
+        )
