@@ -19,7 +19,7 @@ def vehicle_lines(scenario: Scenario) -> list[str]:
     believed = scenario.vehicle.vehicle
     lines = vehicle_warnings(believed)
     # With the same numbers the true vehicle has the same lines; with others, those that came with the mismatch.
-    more = [line for line in vehicle_warnings(scenario.mismatch.applied(believed)) if line not in lines]
+    more = [line for line in vehicle_warnings(scenario.mismatch.applied(scenario.vehicle)) if line not in lines]
     about = f"vehicle '{scenario.vehicle.name}'"
     return [f"{about}: {line}" for line in lines] + [f"{about} with its mismatch: {line}" for line in more]
 
