@@ -20,8 +20,7 @@ that is left over (`yaw_torque`) spins the body up, in this model without end, i
 *Spinning* is necessary and no more: at rest on average the mean thrust vector is N (drag is linear in the velocity,
 whose mean is 0) and no longer than the mean thrust; below it nothing stays in place, whatever it does. Whether there
 is a periodic motion about a tilted axis, as with lost rotors in Mueller and D'Andrea (2014), depends on inertia and
-on the drag torque of the turning body, which this model lacks: it is not computed. Nor is rotor lag, nor the way
-from flight before the fault; for torque to spare see `torque_reserve`.
+on the drag torque of the turning body, which this model lacks: not computed; nor are rotor lag and the way there.
 """
 
 from __future__ import annotations
@@ -33,6 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
@@ -365,6 +365,8 @@ def _reaches(rooms: tuple[Scalar, ...], arms: tuple[Scalar, ...], scale: tuple[S
 
 def _thrust_ranges(vehicle: Vehicle, loss: PerRotor) -> tuple[PerRotor, PerRotor]:
     """Least and largest thrust of each rotor in N."""
+    require(vehicle, Vehicle, "vehicle", "a Vehicle, such as load_vehicle(...).vehicle")
+    require(loss, PerRotor, "loss", "a PerRotor, such as PerRotor(0.4, 0, 0, 0)")
     effect = loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
     return effect * vehicle.thrust_min, effect * vehicle.thrust_max
 
@@ -391,9 +393,7 @@ def _room(vehicle: Vehicle) -> Scalar:
 
 def _index(rotor: int) -> int:
     """Place of a rotor in the vehicle, from 0."""
-    if rotor not in (1, 2, 3, 4):
-        raise InputError(f"rotor: got {rotor!r}; allowed: 1 to 4")
-    return rotor - 1
+    return whole_number(rotor, "rotor", 1, 4) - 1
 
 
 def _thrust(most: float) -> str:

@@ -22,6 +22,7 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
+from rotorfault.base.bounds import positive, require
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
 from rotorfault.base.text_table import table_lines
@@ -43,6 +44,7 @@ __all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings"
 # The usual least margins of a flight control loop (6 dB, 30 degrees).
 LEAST_GAIN_MARGIN = 2.0
 LEAST_PHASE_MARGIN = math.radians(30.0)
+LONGEST_PERIOD = 0.1  # s: slower no vehicle is held in hover, and each trial step takes a step per ms of it
 SAME_POLE = 2e-3  # relative distance within which poles are listed as one; a computed double pole is split a little
 
 
@@ -159,11 +161,13 @@ def trim_report(
     Raises
     ------
     InputError
-        If the period is not above 0 and up to 1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
+        If the period is not above 0 and up to 0.1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
         preset.
     """
-    if not 0.0 < period <= 1.0:
-        raise InputError(f"period: got {period!r} s; allowed: greater than 0, up to 1")
+    require(vehicle, (Vehicle, VehicleFile, str, Path), "vehicle", "a name, a path that ends in .toml, or a Vehicle")
+    if loss is not None:
+        require(loss, PerRotor, "loss", "a PerRotor, such as PerRotor(0.4, 0.0, 0.0, 0.0)")
+    period = positive(period, "period", "s", LONGEST_PERIOD)
     if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
         raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
     if isinstance(vehicle, (str, Path)):

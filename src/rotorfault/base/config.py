@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
+from rotorfault.base.bounds import require_shallow, too_deep
 from rotorfault.base.errors import InputError, choices, nearest
 from rotorfault.base.number_rule import OWN, short, strict
 from rotorfault.base.number_rule import refusal as refusal
@@ -95,8 +96,13 @@ def explain(error: ValidationError, where: str, data: Any = None, keys: bool = F
     more = f" (and {len(details) - 1} more)" if len(details) > 1 else ""
     path, message = _parts(details[0])
     text = ": ".join(part for part in (where, in_words(path, data), message) if part)
-    key = f" (key {'.'.join(path)})" if keys and any(part.isdigit() for part in path) else ""
+    key = f" (key {'.'.join(path)})" if keys and any(is_index(part) for part in path) else ""
     return f"{text}{key}{more}"
+
+
+def is_index(key: str) -> bool:
+    """Whether a key counts things of a list: digits of ASCII alone, for others read as numbers too, or as none."""
+    return key.isascii() and key.isdigit() and len(key) < 10
 
 
 def in_words(keys: Sequence[str], data: Any = None) -> str:
@@ -113,12 +119,12 @@ def in_words(keys: Sequence[str], data: Any = None) -> str:
     for place, key in enumerate(keys):
         if isinstance(here, Mapping):
             here = here.get(key)
-        elif isinstance(here, (list, tuple)) and key.isdigit() and int(key) < len(here):
+        elif isinstance(here, (list, tuple)) and is_index(key) and int(key) < len(here):
             here = here[int(key)]
         else:
             here = None
-        if not (key.isdigit() and words):
-            words += f"{'' if not words else ': ' if keys[place - 1].isdigit() else '.'}{key}"
+        if not (is_index(key) and words):
+            words += f"{'' if not words else ': ' if is_index(keys[place - 1]) else '.'}{key}"
         elif place + 1 < len(keys) or isinstance(here, Mapping):
             name = here.get("name") if isinstance(here, Mapping) else None
             words += f" {int(key) + 1}" + (f" ({name!r})" if isinstance(name, str) and name else "")
@@ -171,6 +177,7 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
     InputError
         If the data do not fit the model; the message is that of `explain`.
     """
+    require_shallow(data, where)
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
@@ -180,9 +187,16 @@ def validate(model: type[M], data: Any, where: str, context: dict[str, Any] | No
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Parse TOML text that was read from `where`; raises InputError with line and column if it is not TOML."""
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{where}: not valid TOML: {error}; correct the syntax there") from None
+    except ValueError:
+        # Python's own bound on the digits that it reads.
+        raise InputError(f"{where}: a whole number has thousands of digits; allowed: up to 1.8e308") from None
+    except RecursionError:
+        raise too_deep(where) from None
+    require_shallow(tables, where)  # dotted keys nest too
+    return tables
 
 
 def read_text(path: str | Path) -> str:

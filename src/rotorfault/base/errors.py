@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
 
 from rotorfault.base.plain_text import one_line
@@ -33,6 +34,19 @@ class VehicleWarning(UserWarning):
     """A vehicle's numbers are possible, but hardly meant, or hardly fit to fly."""
 
 
+def short(value: object) -> str:
+    """A value in at most 60 characters, for messages."""
+    try:
+        text = " ".join(repr(value).split())
+    except (ValueError, RecursionError):  # Python writes out no whole number of many thousand digits
+        text = "a value that is too large to be written out"
+        if isinstance(value, int):
+            text = f"a number of about {int(value.bit_length() * math.log10(2.0)):,} digits"
+    except Exception as error:  # of an object whose text its maker got wrong
+        text = f"a {type(value).__name__} ({type(error).__name__} when written out)"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def unknown(sort: str, name: object, allowed: list[str]) -> str:
     """One line for a name that does not exist: what came, what is allowed, the nearest.
 
@@ -45,7 +59,8 @@ def unknown(sort: str, name: object, allowed: list[str]) -> str:
     allowed : list of str
         The names that exist.
     """
-    return f"unknown {sort} '{name}'{nearest(name, allowed)} ({choices(allowed)})"
+    given = name if isinstance(name, str) else short(name)
+    return f"unknown {sort} '{given}'{nearest(name, allowed)} ({choices(allowed)})"
 
 
 def choices(allowed: Iterable[str]) -> str:
@@ -58,7 +73,7 @@ def nearest(name: object, allowed: Iterable[str]) -> str:
 
     A name is near if it differs by a slip of the keys or two, by capitals, or by what is missing at its end.
     """
-    given, names = str(name).lower(), {one.lower(): one for one in allowed}
+    given, names = (name if isinstance(name, str) else short(name)).lower(), {one.lower(): one for one in allowed}
     close = difflib.get_close_matches(given, names, n=1, cutoff=ALIKE)
     close = close or [one for one in names if len(given) >= SHORTENED and one.startswith(given)]
     return f"; did you mean '{names[close[0]]}'?" if close else ""

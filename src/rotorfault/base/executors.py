@@ -12,6 +12,7 @@ from multiprocessing import get_context, resource_tracker
 from typing import Any, final
 
 from rotorfault.base import interrupts
+from rotorfault.base.bounds import thread_count
 from rotorfault.base.errors import InputError
 from rotorfault.base.resumable import Executor, InputT, KeyT, ResultT, Task
 
@@ -50,7 +51,7 @@ class Processes:
     threads = 1
 
     def __init__(self, workers: int | None = None) -> None:
-        self._workers = workers or os.cpu_count() or 1
+        self._workers = thread_count(workers, "workers") or os.cpu_count() or 1
 
     def map(
         self, work: Callable[[InputT], ResultT], tasks: Sequence[Task[KeyT, InputT]]
@@ -112,10 +113,11 @@ def executor_of(threads: int | None, scheduler: str | None) -> Executor:
     Raises
     ------
     InputError
-        If Dask is not installed, or the scheduler cannot be reached.
+        If there are too many threads, Dask is not installed, or the scheduler cannot be reached.
     """
+    count = thread_count(threads, "workers")
     if scheduler is None:
-        return InProcess(threads or os.cpu_count())
+        return InProcess(count or os.cpu_count())
     if importlib.util.find_spec("distributed") is None:
         raise InputError("--scheduler needs Dask, which is not installed; install rotorfault[cluster]")
     from rotorfault.base.dask_executor import Dask  # loads Dask, which takes longer than most campaigns

@@ -13,6 +13,8 @@ from typing import Any, cast
 
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from rotorfault.base.errors import short as short
+
 OWN = "rotorfault"
 """Marks the errors that say by themselves what came and what is allowed."""
 
@@ -31,15 +33,6 @@ def refusal(key: str, message: str) -> PydanticCustomError:
         One line.
     """
     return PydanticCustomError(OWN, "{message}", {"message": message, "key": key})
-
-
-def short(value: object) -> str:
-    """A value in at most 60 characters, for messages."""
-    try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # Python writes out no whole number of many thousand digits
-        text = f"a number of about {int(cast('int', value).bit_length() * math.log10(2.0)):,} digits"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def plain_number(text: str) -> float:

@@ -10,7 +10,8 @@ from typing import Any, final
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.bounds import require
+from rotorfault.base.errors import InputError, short
 from rotorfault.base.executors import executor_of
 from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
@@ -46,6 +47,7 @@ class Campaign:
     """
 
     def __init__(self, folder: str | Path, *, allow_code: bool = False) -> None:
+        require(folder, (str, Path), "folder", "the path of a campaign's folder")
         self.folder = Path(folder)
         self._store = Store.open(self.folder)
         self.study: Study = study_from(self._store.study, str(self.folder / "study.json"), allow_code)
@@ -164,8 +166,9 @@ def campaign(
     elif isinstance(study, Mapping):
         checked = study_from(dict(study), "study", allow_code)
     else:
-        raise InputError(f"study: got {study!r}; allowed: a name, a path, tables or a Study")
+        raise InputError(f"study: got {short(study)}; allowed: a name, a path, tables or a Study")
     checked = changed(checked, vehicle, preset, seed, budget).resolved()
+    require(out or "", (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)
     for scenario in checked.scenarios:

@@ -49,7 +49,7 @@ def load_engine(name: str) -> Engine:
     InputError
         If there is no such engine, or it needs llvmlite and that is not installed.
     """
-    if name not in ENGINES:
+    if not isinstance(name, str) or name not in ENGINES:
         raise InputError(unknown("engine", name, list(ENGINES)))
     if name == "simd" and not have_simd():
         raise InputError("engine 'simd' needs llvmlite, not installed; use --engine numpy or --engine python")

@@ -12,6 +12,7 @@ from typing import Any, final
 
 from rotorfault.autopilot.autopilot import AnyBlock
 from rotorfault.autopilot.control.python_controller import Updates, as_controller
+from rotorfault.base.bounds import require
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place, load
@@ -77,6 +78,7 @@ def check_block(
     InputError
         If a rule is broken; the message names each and what to change.
     """
+    require(settings or {}, Mapping, "settings", "a table of settings")
     checked = _part(part, dict(settings or {}))
     report = BlockReport(f"{checked.slot.registry.sort} {checked.kind}", tuple(Rules(checked).checks()))
     if not report.kept:

@@ -14,7 +14,8 @@ from rotorfault._version import __version__
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
-from rotorfault.base.errors import InputError
+from rotorfault.base.bounds import require, require_shallow
+from rotorfault.base.errors import InputError, short
 from rotorfault.base.foreign import is_own, source_digest
 from rotorfault.base.progress import Bar
 from rotorfault.base.versions import versions
@@ -81,7 +82,7 @@ def fly(
     own: Own = {} if controller is None or named is not None else {CONTROLLER: as_controller(controller)}
     batch = assemble(checked, own)
     python_only = any(part.python_only for _, part in batch.loop.each())
-    name = engine or ("python" if python_only else default_engine(1))
+    name = ("python" if python_only else default_engine(1)) if engine is None else engine
     if name != "python" and python_only:
         raise InputError(
             f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
@@ -103,11 +104,12 @@ def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list
     InputError
         If they differ in more; see `rotorfault.flight.assembly.assemble_all`.
     """
+    allowed = "Scenario objects, such as load_scenario(...) returns"
+    require(scenarios, Sequence, "scenarios", f"a list of {allowed}")
     for scenario in scenarios:
-        if not isinstance(scenario, Scenario):
-            raise InputError(f"got {scenario!r}; allowed: Scenario objects, such as load_scenario(...) returns")
+        require(scenario, Scenario, "scenarios", allowed)
         warn_of_vehicle(scenario)
-    name = engine or default_engine(len(scenarios))
+    name = default_engine(len(scenarios)) if engine is None else engine
     batch = assemble_all(scenarios)
     recording = _run(batch, name, scenarios[0].period)
     return [_flight(scenario, recording, batch, i, name, None) for i, scenario in enumerate(scenarios)]
@@ -123,9 +125,11 @@ def prepare(
     """Check a scenario with what overrides it; see `fly`."""
     overrides: dict[str, Any] = {} if controller is None else {"controller.kind": controller}
     if not isinstance(settings or {}, Mapping) or not all(isinstance(key, str) for key in settings or {}):
-        raise InputError(f"settings: got {settings!r}; allowed: dotted keys and values, such as {{'duration': 5.0}}")
-    if not isinstance(scenario, (str, Path, Mapping, Scenario)):
-        raise InputError(f"scenario: got {scenario!r}; allowed: a name, a path, tables or a Scenario")
+        hint = "dotted keys and values, such as {'duration': 5.0}"
+        raise InputError(f"settings: got {short(settings)}; allowed: {hint}")
+    require(scenario, (str, Path, Mapping, Scenario), "scenario", "a name, a path, tables or a Scenario")
+    require_shallow(scenario, "scenario")
+    require_shallow(settings, "settings")
     overrides |= dict(settings or {})
     if seed is not None:
         overrides["seed"] = seed

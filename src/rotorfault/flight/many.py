@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base.bounds import positive, require, thread_count
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.progress import Bar
 from rotorfault.engine import default_engine, load_engine
@@ -150,6 +151,7 @@ def fly_many(
     KeyboardInterrupt
         On Ctrl-C.
     """
+    require(settings or {}, Mapping, "settings", "dotted keys and values, such as {'duration': 5.0}")
     common = dict(settings or {})
     if record_period is not None:
         common["record_period"] = record_period
@@ -162,10 +164,8 @@ def fly_many(
     layouts = [build(group.scenario).layout for group in groups] if record else []
     rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)
     width = len(rows[0])
-    if within is not None and not within > 0.0:
-        raise InputError(f"within: got {within!r}; allowed: a length in m above 0")
-    if threads is not None and threads < 1:
-        raise InputError(f"threads: got {threads!r}; allowed: 1 or more")
+    within = None if within is None else positive(within, "within", "m")
+    threads = thread_count(threads)
     one = groups[0].scenario  # for all, where signals are recorded
     if width and len({(group.scenario.steps, group.scenario.every, group.scenario.period) for group in groups}) > 1:
         raise InputError("recorded flights must have one length and one recording period; fly them apart")
@@ -177,7 +177,7 @@ def fly_many(
         )
     signals = np.full((records, width, count), np.nan)
     python_only = any(part.make().python_only for group in groups for _, part in group.scenario.parts())
-    name, flown, done = engine or ("python" if python_only else default_engine(count)), 0, 0.0
+    name, flown, done = ("python" if python_only else default_engine(count)) if engine is None else engine, 0, 0.0
     tables: list[ScoreTable] = []
     order: list[NDArray[np.intp]] = []
     total = float(sum(len(group.flights) * group.scenario.duration for group in groups))
@@ -237,6 +237,7 @@ def _rows(record: Sequence[str], layout: Layout) -> tuple[int, ...]:
     """Rows of a layout by names of signals or of components."""
     if isinstance(record, str):
         raise InputError(f"record: got {record!r}; allowed: a list of names, such as ['{record}']")
+    require(record, (Sequence, set), "record", "a list of names, such as ['position']")
     rows: list[int] = []
     for name in record:
         matching = layout.matching(str(name))

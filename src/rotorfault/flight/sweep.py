@@ -24,10 +24,9 @@ from rotorfault.flight.assembly import Group, assemble, overridden
 from rotorfault.flight.beginning import begins_alike
 from rotorfault.scenario.overrides import override
 from rotorfault.scenario.part import Part
-from rotorfault.scenario.scenario import Scenario
+from rotorfault.scenario.scenario import MOST_SEED, Scenario
 from rotorfault.scenario.slots import SLOTS
 
-MOST_SEED = 10**12
 _TABLES = ("vehicle", "mismatch", "start")  # of numbers that may vary, besides those of the parts
 
 Columns = Mapping[str, NDArray[Any]]

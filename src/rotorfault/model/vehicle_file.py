@@ -25,6 +25,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotorfault.base.bounds import require
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.maths.geometry import PerRotor, Vec3
@@ -286,6 +287,7 @@ def load_vehicle(name_or_path: str | Path) -> VehicleFile:
     InputError
         If there is no such vehicle or file, or it is not right; one line with file and key.
     """
+    require(name_or_path, (str, Path), "vehicle", "a name, or a path that ends in .toml")
     if str(name_or_path).endswith(".toml"):
         where, text = str(name_or_path), read_text(name_or_path)
     else:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import h5netcdf
 import xarray as xr
 
+from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
 from rotorfault.results.seal import DIGESTS, changed_attributes, changed_variables
@@ -51,6 +52,7 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
     InputError
         If it is missing, unreadable, truncated, or no flight of this program.
     """
+    require(path, (str, Path), "flight", "the path of a flight.nc")
     data = _from(Path(path), _dataset)
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
@@ -111,6 +113,7 @@ def read_configuration(path: str | Path) -> tuple[dict[str, Any], dict[str, Any]
     InputError
         If it is missing, unreadable, truncated, or no flight of this program.
     """
+    require(path, (str, Path), "flight", "the path of a flight.nc")
     attributes = _from(Path(path), _attributes)
     if attributes.get("format") not in (FORMAT, OLD_FORMAT):
         raise InputError(f"{path}: attribute 'format' is {attributes.get('format')!r}; allowed: '{FORMAT}'")

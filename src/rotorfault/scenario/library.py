@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from rotorfault.base.bounds import require
 from rotorfault.base.config import parse_toml, read_text
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.foreign import is_place
@@ -40,6 +41,7 @@ def load_scenario(
     InputError
         If there is no such scenario, or it is not right; one line with file and key.
     """
+    require(name_or_path, (str, Path), "scenario", "a name, or a path that ends in .toml")
     if str(name_or_path).endswith(".toml"):
         where, text, folder = str(name_or_path), read_text(name_or_path), Path(name_or_path).parent
     else:

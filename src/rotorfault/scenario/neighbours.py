@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from rotorfault.base.bounds import positive, require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.plant import FAULT
-from rotorfault.scenario.scenario import Mismatch, Scenario, Start
+from rotorfault.scenario.scenario import MOST_SEED, Mismatch, Scenario, Start
 
 
 def neighbour(
@@ -38,9 +39,9 @@ def neighbour(
     InputError
         If `seed` or `spread` is out of its range.
     """
-    if not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed: got {seed!r}; allowed: a whole number, 0 or greater")
-    if not 0.0 < spread < 1.0:
+    require(scenario, Scenario, "scenario", "a Scenario, such as load_scenario(...) returns")
+    seed = whole_number(seed, "seed", 0, MOST_SEED)
+    if positive(spread, "spread", "1", 1.0) == 1.0:
         raise InputError(f"spread: got {spread!r}; allowed: between 0 and 1, both excluded")
     # The second word keeps this stream apart from the sensor noise of the same seed.
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 1 << 40])))

@@ -6,7 +6,9 @@ import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.bounds import require_shallow
+from rotorfault.base.config import is_index
+from rotorfault.base.errors import InputError, short
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.part import change_kind, change_preset
 from rotorfault.scenario.slots import SLOTS
@@ -14,6 +16,12 @@ from rotorfault.scenario.slots import SLOTS
 
 def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
     """Set several dotted keys in tables, in place: tables, kinds and presets first, for they drop what was there."""
+
+    if not isinstance(changes, Mapping) or not all(isinstance(key, str) for key in changes):
+        raise InputError(
+            f"settings: got {short(changes)}; allowed: dotted keys and values, such as {{'duration': 5.0}}"
+        )
+    require_shallow(changes, "settings")
 
     def outermost_first(key: str) -> tuple[int, bool]:
         *path, last = key.split(".")
@@ -75,7 +83,7 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
-    if not part.isdigit() or int(part) >= len(items):
+    if not is_index(part) or int(part) >= len(items):
         allowed = f"0 to {len(items) - 1} (0 is the first)" if items else "none, for the list is empty"
         raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: {allowed}")
     return int(part)
@@ -98,4 +106,6 @@ def parse_overrides(pairs: list[str]) -> dict[str, Any]:
             found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:
             found[key.strip()] = text.strip()
+        except (ValueError, RecursionError):
+            found[key.strip()] = text.strip()  # digits or brackets without end: no value of any key
     return found

@@ -36,6 +36,7 @@ B = TypeVar("B")
 
 ROUNDING = 1e-12  # relative, of a time over another
 PERIOD_TOLERANCE = 1e-9  # relative: how exactly the step must divide the sampling period
+MOST_SEED = 10**12
 MOST_SUBSTEPS = 1000  # per sampling period
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
@@ -126,7 +127,7 @@ class Scenario(Strict):
     record_period: float | None = Field(
         default=None, gt=0.0, description="time between two records [s]; the sampling period if not given"
     )
-    seed: int = Field(default=0, ge=0, le=10**12, description="names the random numbers of sensor noise and gusts")
+    seed: int = Field(default=0, ge=0, le=MOST_SEED, description="names the random numbers of sensor noise and gusts")
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
 

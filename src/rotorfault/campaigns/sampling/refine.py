@@ -14,6 +14,8 @@ mislead.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,11 @@ Flags = NDArray[np.bool_]
 BOUNDARY = 0.5  # success rate near which cells go first where a budget does not suffice for all
 
 
+# Of a sampling plan: a few GB and some ten seconds.
+MOST_POINTS = 25_000  # numbers of flights and successes at which a cell is looked at
+MOST_PAIRS = 15_000_000  # from one look to the next
+
+
 class Refinement(Strict):
     """How many flights a cell gets."""
 
@@ -46,17 +53,40 @@ class Refinement(Strict):
     def _consistent(self) -> Refinement:
         if self.most < self.initial:
             raise refusal("most", f"got {self.most}; allowed: at least initial, {self.initial}")
+        reached, work = _reached(self), "whose intervals take more time and memory than there is"
+        if not reached:
+            most = math.isqrt(MOST_PAIRS) - 1
+            raise refusal("initial", f"got {self.initial}, {work}; allowed: up to {most}")
+        if reached < self.most:
+            rule = f"initial = {self.initial}, block = {self.block} and growth = {self.growth:g}"
+            raise refusal("most", f"got {self.most}, {work}; with {rule}, {reached} is allowed")
         return self
 
 
 def looks(settings: Refinement) -> tuple[int, ...]:
     """Numbers of flights that a cell can have after a round, ascending."""
-    counts = [settings.initial]
-    while counts[-1] < settings.most:
+    return tuple(_looks(settings))
+
+
+def _looks(settings: Refinement) -> Iterator[int]:
+    count = settings.initial
+    yield count
+    while count < settings.most:
         # Whole blocks: fewer rounds, some more flights.
-        blocks = max(round(settings.growth * counts[-1] / settings.block), 1)
-        counts.append(min(counts[-1] + blocks * settings.block, settings.most))
-    return tuple(counts)
+        blocks = max(round(min(settings.growth * count / settings.block, settings.most)), 1)
+        count = min(count + blocks * settings.block, settings.most)
+        yield count
+
+
+def _reached(settings: Refinement) -> int:
+    """Flights in a cell up to which the sampling plan can be made, `most` at most."""
+    points, before = 0, 0
+    for count in _looks(settings):
+        points += count + 1
+        if points > MOST_POINTS or (count + 1) * (count - before + 1) > MOST_PAIRS:
+            return before
+        before = count
+    return before
 
 
 def intervals(successes: ArrayLike, trials: ArrayLike, settings: Refinement) -> Interval:
