@@ -15,7 +15,8 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper ranges test test-numpy lint types bench peers maps benchmarks clean check-python
+.PHONY: help venv paper ranges test test-numpy test-bounds fuzz lint types bench peers maps benchmarks clean \
+  check-python
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-14s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -58,6 +59,23 @@ test: .venv/.stamp-develop ## Run the tests
 
 test-numpy: .venv-numpy/.stamp ## Run the tests without llvmlite, in .venv-numpy
 	.venv-numpy/$(BIN)/python -m pytest -n 2
+
+# Both ends of every bound in pyproject.toml: the lowest versions that it allows, and the newest that there are.
+BOUNDS_EXTRAS := flightcode,tune,cluster
+BOUNDS_TOOLS := pytest pytest-xdist hypothesis duckdb pandas
+BOUNDS_TESTS := tests/base tests/cli/test_main.py tests/results tests/reference tests/tuning tests/campaigns/store \
+  tests/campaigns/report tests/engine/test_engines.py tests/engine/test_cache.py tests/maths
+
+test-bounds: | check-python ## Run a quick part of the tests with the lowest versions allowed, then with the newest
+	$(PYTHON) tools/bounds.py > .lowest.txt
+	$(PYTHON) -m venv .venv-lowest && $(PYTHON) -m venv .venv-newest
+	.venv-lowest/$(BIN)/python -m pip install --quiet -c .lowest.txt -e '.[$(BOUNDS_EXTRAS)]' $(BOUNDS_TOOLS)
+	.venv-newest/$(BIN)/python -m pip install --quiet --upgrade -e '.[$(BOUNDS_EXTRAS)]' $(BOUNDS_TOOLS)
+	.venv-lowest/$(BIN)/python -m pytest -n 2 $(BOUNDS_TESTS)
+	.venv-newest/$(BIN)/python -m pytest -n 2 $(BOUNDS_TESTS)
+
+fuzz: .venv/.stamp-develop ## Try 10,000 inputs that nobody meant, and print counts (COUNT=, FIRST= for others)
+	.venv/$(BIN)/python tools/fuzz.py --count $(or $(COUNT),10000) --first $(or $(FIRST),1)
 
 lint: .venv/.stamp-develop ## Check style and format with ruff
 	.venv/$(BIN)/ruff check

@@ -14,7 +14,16 @@ from hypothesis import HealthCheck, given, settings
 
 import rotorfault as rf
 
-EXAMPLES = {"scenario": 25, "vehicle": 15, "study": 12, "table": 30, "set": 30, "vary": 8, "text": 40, "flight file": 8}
+EXAMPLES = {
+    "scenario": 25,
+    "vehicle": 15,
+    "study": 12,
+    "table": 30,
+    "set": 30,
+    "vary": 8,
+    "text": 40,
+    "flight file": 8,
+}
 
 
 def test_every_kind_has_examples() -> None:
@@ -107,5 +116,3 @@ def test_arguments_of_another_type_are_refused(call: Any) -> None:
 def _takes_numbers(call: Any) -> bool:
     source = " ".join(map(str, call.__code__.co_consts))
     return "vehicle.mass.value" in source or "within" in source
-
-

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from rotorfault.base import foreign
-from rotorfault.base.bounds import require
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.number_rule import short
@@ -330,7 +329,6 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None, 
     InputError
         If there is no such study, or it is not right; one line with file and key.
     """
-    require(name_or_path, (str, Path), "study", "a name, or a path that ends in .toml")
     if str(name_or_path).endswith(".toml"):
         where, text = str(name_or_path), read_text(name_or_path)
     else:
@@ -370,7 +368,6 @@ def changed(
     """
     tables = study.as_tables()
     if vehicle is not None:
-        require(vehicle, str, "vehicle", "a name, or a path that ends in .toml")
         for variant in tables["variant"]:
             variant["settings"] = {**variant.get("settings", {}), "vehicle": vehicle}
         tables["name"] += "-" + re.sub(r"[^A-Za-z0-9_.-]", "-", Path(vehicle).stem)

@@ -3,15 +3,15 @@ r"""What a flight is worth, counted while it flies: every number of a flight com
 Pure functions on scalars, so that every engine counts alike, a batch of a hundred thousand flights needs no records,
 and a flight has one set of numbers whatever of it is recorded and how finely.
 
-- *Outcome*: ``diverged`` (a number of the true state, of the commands or of what is counted here is not finite, or
-  it is further than 10 km away), ``tumbled`` (tilt beyond 90 degrees) or ``ground`` (crash: touched the ground faster
-  than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees, or sank into it by the length of its legs) end a
-  flight; so does ``landed`` (touched it more gently than that in a landing, and stood there with rotors stopped for
-  0.5 s). It touches where the ground pushes it up with 1 % of its weight or more. A flight that lasts to its end is
-  ``settled`` (constant reference, within 2 % of the step and 0.1 rad of yaw at the end), ``tracked`` (a reference
-  that moves or turns, root mean square errors over the last half within 5 % of the reference's span on every axis
-  and 0.1 rad of yaw) or ``offset`` (neither). It has *survived* unless it diverged, tumbled or crashed. A flight that
-  somebody ended before is ``interrupted``.
+- *Outcome*: ``diverged`` (a number of the true state, of the commands, of the cost or of what parts record of
+  themselves is not finite, or it is further than 10 km away), ``tumbled`` (tilt beyond 90 degrees) or ``ground``
+  (crash: touched the ground faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees, or sank into it
+  by the length of its legs) end a flight; so does ``landed`` (touched it more gently than that in a landing, and
+  stood there with rotors stopped for 0.5 s). It touches where the ground pushes it up with 1 % of its weight or more.
+  A flight that lasts to its end is ``settled`` (constant reference, within 2 % of the step and 0.1 rad of yaw at the
+  end), ``tracked`` (a reference that moves or turns, root mean square errors over the last half within 5 % of the
+  reference's span on every axis and 0.1 rad of yaw) or ``offset`` (neither). It has *survived* unless it diverged,
+  tumbled or crashed. A flight that somebody ended before is ``interrupted``.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
 - *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.
@@ -148,7 +148,7 @@ class Scoring:
         flying = less(scores.over, 0.5)
         cosine, begun = signals.quaternion.z_axis().z, self._begun(onsets, time)
         new = self._count(scores, signals, parameters, cosine, begun, onsets, step, time)
-        numbers = self._is_finite(signals, new)
+        numbers = _is_finite(signals, new)
         gentle, touched, rest = 1.0, 0.0, 0.0
         # Written as "not inside", so that NaN counts as outside.
         upright = greater(cosine, 0.0)
@@ -313,28 +313,13 @@ class Scoring:
             signals.torque_demand - signals.torque_unallocated,
         )
 
-    def _is_finite(self, signals: Any, new: Scores) -> Scalar:
-        """1 where every number of the true state, of the commands and of what is counted is finite."""
-        rows = flatten((signals.position, signals.velocity, signals.quaternion, signals.body_rates, signals.thrust))
-        rows += flatten((signals.thrust_command, new.cost))
-        for signal in self.counted:
-            rows += self._leaves(signal, signals)
-        total = rows[0]
-        for row in rows[1:]:
-            total = total + row  # infinite or NaN where any is
-        return is_finite(total)
-
     @staticmethod
-    def _leaves(signal: Signal, signals: Any) -> list[Scalar]:
-        """The numbers of one signal."""
+    def _signal(signal: Signal, old: Scalar, signals: Any, first: Scalar) -> Scalar:
+        """What is counted of one signal after this instant."""
         value = signals.parts if "." in signal.name else signals
         for name in signal.name.split("."):
             value = getattr(value, name)
-        return list(flatten(value))
-
-    def _signal(self, signal: Signal, old: Scalar, signals: Any, first: Scalar) -> Scalar:
-        """What is counted of one signal after this instant."""
-        leaves = self._leaves(signal, signals)
+        leaves = flatten(value)
         if signal.quantity.score == "fraction":
             return old + any_of(greater(leaf, 0.5) for leaf in leaves)
         largest = leaves[0]
@@ -369,6 +354,16 @@ class Scoring:
             slide=select(touches, _horizontal(scores.velocity), old.slide),
             cosine=select(touches, scores.attitude.z_axis().z, old.cosine),
         )
+
+
+def _is_finite(signals: Any, new: Scores) -> Scalar:
+    """1 where every number of the true state, of commands, of the cost and of what parts tell of themselves is."""
+    rows = flatten((signals.position, signals.velocity, signals.quaternion, signals.body_rates, signals.thrust))
+    rows += flatten((signals.thrust_command, new.cost, signals.parts))
+    total = rows[0]
+    for row in rows[1:]:
+        total = total + row  # infinite or NaN where any is
+    return is_finite(total)
 
 
 def _touching(signals: Any, parameters: ScoringParameters) -> Scalar:
