@@ -133,6 +133,7 @@ def tune(
     from rotorfault.tuning import search
 
     settings = parse_overrides(assignments or [])
+    search.require_name(name)
     if out is not None:
         output_folder(out.parent)
     with Bar(f"tuning {controller}", generations, "generations") as bar:

@@ -75,7 +75,9 @@ class Waypoints(ReferenceSource):
         """Which points."""
 
         points: tuple[Waypoint, ...] = Field(
-            min_length=1, description="Waypoints in order of time; the first and last are held before and after"
+            min_length=1,
+            max_length=10_000,
+            description="Waypoints in order of time; the first and last are held before and after",
         )
 
         @model_validator(mode="after")

@@ -5,6 +5,8 @@ Source: N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv 1604.00772; t
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -13,6 +15,8 @@ import numpy as np
 
 from rotorfault._version import __version__
 from rotorfault.autopilot.control import CONTROLLER
+from rotorfault.base.bounds import whole_number
+from rotorfault.base.errors import InputError, short
 from rotorfault.base.foreign import is_place
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch, no_watch
@@ -29,6 +33,8 @@ from rotorfault.tuning.training import NEEDED, balanced, objective_of, training_
 # Initial standard deviation as a share of each range. Our choice: the first generations look around the start, which
 # flies, and not at the bounds.
 SPREAD = 0.15
+MOST_GENERATIONS, MOST_POPULATION = 100_000, 10_000
+MOST_SEED = 2**32 - 1  # that the optimiser takes
 
 
 class Tuned(NamedTuple):
@@ -79,8 +85,12 @@ def tune(
     Raises
     ------
     InputError
-        If there is no search space for the controller, or it cannot be flown in a batch.
+        If a number is out of its range, there is no search space for the controller, it cannot be flown in a batch,
+        or what overrides the training flights takes their faults away.
     """
+    generations = whole_number(generations, "generations", 1, MOST_GENERATIONS)
+    population = whole_number(population, "population", 4, MOST_POPULATION)
+    seed = whole_number(seed, "seed", 1, MOST_SEED)
     space, worth = space_of(controller, box), objective_of(objective).worth
     groups = training_groups(controller, overrides or {}, neighbours)
     low, start, high = (np.log([entry[i] for entry in space]) for i in (1, 2, 3))
@@ -167,12 +177,34 @@ def as_toml(tuned: Tuned, name: str) -> str:
 
 def _table(tables: dict[str, Any], prefix: str) -> list[str]:
     plain = {key: value for key, value in tables.items() if not isinstance(value, dict)}
-    lines = [f"[{prefix}]", *(f"{key} = {_value(value)}" for key, value in plain.items()), ""] if plain else []
+    lines = [f"[{prefix}]", *(f"{_key(key)} = {_value(value)}" for key, value in plain.items()), ""] if plain else []
     for key, value in tables.items():
         if isinstance(value, dict):
-            lines += _table(value, f"{prefix}.{key}")
+            lines += _table(value, f"{prefix}.{_key(key)}")
     return lines
 
 
 def _value(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    # JSON's texts and truth values are TOML's too; its numbers are Python's, but for those that are not finite.
+    return json.dumps(value) if isinstance(value, (str, bool)) else repr(value)
+
+
+def _key(key: str) -> str:
+    """A key, dotted or not, quoted where TOML asks for it."""
+    bare = (part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else json.dumps(part) for part in key.split("."))
+    return ".".join(bare)
+
+
+def require_name(name: str) -> str:
+    """The same name of a preset, if a TOML file can have it for a table's.
+
+    Raises
+    ------
+    InputError
+        If it is anything but letters, digits, hyphens and underscores.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name):
+        raise InputError(f"name: got {short(name)}; allowed: up to 60 letters, digits, hyphens and underscores")
+    return name

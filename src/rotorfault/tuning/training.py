@@ -112,6 +112,11 @@ def training_groups(
         plain = {"controller.preset": "none"} if controller in SPACES else {}
         settings = {"controller.kind": controller, **plain, "record_period": 0.01, **own, **overrides}
         base = load_scenario(name, settings)
+        if not all("time" in type(part.settings).model_fields for part in base.all(FAULT)) or not base.all(FAULT):
+            raise InputError(
+                "fault: gains are searched on flights with faults that set in at a time; leave those of the training "
+                "flights, or give others with 'time'"
+            )
         group = []
         for i in range(count if neighbours is None else min(count, neighbours)):
             one = neighbour(base, seed=FIRST_SEED + i)
