@@ -236,7 +236,7 @@ def ends_at(stage: Any, force: Any) -> tuple[int, int] | None:
     scores, still = scoring.initial(), example(LoopSignals)._asdict()
     parameters = ScoringParameters(zeros(), zeros(), 100.0, -1.0, 1e3, 0.0, touch=0.5)
     for k, (at, push) in enumerate(zip(np.broadcast_to(stage, 200), np.broadcast_to(force, 200), strict=True)):
-        seen = SimpleNamespace(**still, landing_stage=float(at), ground_force=float(push))
+        seen = SimpleNamespace(**still, parts=(), landing_stage=float(at), ground_force=float(push))
         scores = scoring.step(scores, seen, parameters, (), float(k), k * 0.01, 0.01)
     return None if scores.over == 0.0 else (int(scores.end), int(scores.over))
 

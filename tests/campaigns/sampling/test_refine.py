@@ -228,7 +228,7 @@ def test_budget_and_limit_are_kept(seed: int, spare: int, shape: tuple[int, ...]
     assert finished(s, n, settings).all() or settings.budget - n.sum() < 48
 
 
-@given(start=st.integers(1, 50), block=st.integers(1, 50), growth=st.floats(0.0, 2.0), more=st.integers(0, 3000))
+@given(start=st.integers(1, 50), block=st.integers(1, 50), growth=st.floats(0.0, 2.0), more=st.integers(0, 150))
 def test_looks_ascend_to_the_most(start: int, block: int, growth: float, more: int) -> None:
     at = looks(fine(initial=start, block=block, growth=growth, most=start + more))
     assert at[0] == start
