@@ -184,7 +184,7 @@ def test_a_loss_that_is_nan_is_nowhere_possible(rotor: int) -> None:
 
 @pytest.mark.parametrize("rotor", [0, 5, -1, 1.5])
 def test_there_are_four_rotors(rotor: Any) -> None:
-    with pytest.raises(InputError, match="allowed: 1 to 4"):
+    with pytest.raises(InputError, match="allowed: a whole number from 1 to 4"):
         critical_loss(PAPER, rotor)
     with pytest.raises(InputError, match="allowed"):
         critical_pair(PAPER, 1, rotor, [0.0])
