@@ -299,10 +299,7 @@ def sources_of(scenario: Scenario) -> dict[str, str]:
     ----------
     scenario : Scenario
     """
-    digests: dict[str, str] = {}
-    for _, part in scenario.parts():
-        digests |= part.sources
-    return digests
+    return {place: digest for _, part in scenario.parts() for place, digest in part.sources.items()}
 
 
 def _require_axis(name: str) -> None:
