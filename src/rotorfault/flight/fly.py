@@ -173,7 +173,7 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
         _without_presets(tables)
     _without_reaction(tables)
     scenario = scenario_from(tables, str(path), allow_code)
-    return fly(scenario, engine=engine or str(attributes["engine"]))
+    return fly(scenario, engine=str(attributes["engine"]) if engine is None else engine)
 
 
 def _without_presets(tables: dict[str, Any]) -> None:
