@@ -5,6 +5,9 @@ They answer whether a flight is an accident of its numbers. What varies is unkno
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from rotorfault.base.bounds import positive, require, whole_number
@@ -25,7 +28,8 @@ def neighbour(
         0 or greater. Names the draw; the same seed gives the same neighbour.
     spread : float
         Between 0 and 1, both excluded. True mass, principal moments of inertia and drag, and each initial
-        position, attitude and rate, are multiplied by factors uniform in 1 -+ spread, independently.
+        position, attitude and rate, are multiplied by factors uniform in 1 -+ spread, independently; but no moment
+        is drawn above the sum of the others.
     onset : (2,) float
         All faults that set in at a time are moved to a common one, uniform in this interval [s].
 
@@ -54,8 +58,8 @@ def neighbour(
         return x, y, z
 
     mass, *inertia, drag = factors(5)
-    # A body whose largest moment exceeds the sum of the others does not exist; the paper's is far from it.
-    mismatch = Mismatch(mass=mass, inertia=(inertia[0], inertia[1], inertia[2]), linear_drag=drag)
+    x, y, z = _existing(scenario.vehicle.vehicle.inertia, inertia)
+    mismatch = Mismatch(mass=mass, inertia=(x, y, z), linear_drag=drag)
     start = Start(
         position=scaled(scenario.start.position),
         velocity=scaled(scenario.start.velocity),
@@ -63,7 +67,7 @@ def neighbour(
         body_rates=scaled(scenario.start.body_rates),
     )
     moment = float(draw.uniform(*onset))
-    # On a sampling instant, as the original's: between two of them it would act from the next sub-step on.
+    # On a sampling instant, as the original's.
     moment = round(moment / scenario.period) * scenario.period
     faults = tuple(
         part.with_settings(part.settings.model_copy(update={"time": moment}))
@@ -72,3 +76,11 @@ def neighbour(
         for part in scenario.all(FAULT)
     )
     return scenario.model_copy(update={"mismatch": mismatch, "start": start, "fault": faults})
+
+
+def _existing(inertia: Iterable[float], factors: Sequence[float]) -> list[float]:
+    """The factors, with that of the largest moment such that it is no larger than the sum of the others."""
+    moments = [moment * factor for moment, factor in zip(inertia, factors, strict=True)]
+    largest = max(moments)
+    most = math.fsum(moments) - largest
+    return [f * min(1.0, most / largest) if m == largest else f for m, f in zip(moments, factors, strict=True)]
