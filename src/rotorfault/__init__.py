@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotorfault.autopilot.instant import Decision
     from rotorfault.autopilot.response.protocol import Response, ResponseInputs
     from rotorfault.base.config import Strict as Settings
-    from rotorfault.base.errors import InputError, VehicleWarning
+    from rotorfault.base.errors import InputError, ReferenceWarning, VehicleWarning
     from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.flight.check_block import BlockReport, check_block
     from rotorfault.flight.flight import Flight, load
@@ -98,6 +98,7 @@ _HOME = {
     "TimeInputs": "plant.timed",
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
+    "ReferenceWarning": "base.errors",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "Wrench": "model.signals",
@@ -158,6 +159,7 @@ __all__ = [
     "Reference",
     "ReferenceSource",
     "ReferenceTable",
+    "ReferenceWarning",
     "Response",
     "ResponseInputs",
     "Scenario",

@@ -30,6 +30,10 @@ class MissingExtraError(InputError):
     """A library that an optional capability needs is not installed."""
 
 
+class ReferenceWarning(UserWarning):
+    """A reference can be flown, but is hardly meant."""
+
+
 class VehicleWarning(UserWarning):
     """A vehicle's numbers are possible, but hardly meant, or hardly fit to fly."""
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorfault.base.angles import in_radians
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, ReferenceWarning
 from rotorfault.base.number_rule import short
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten
@@ -35,7 +36,12 @@ def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> A
     Raises
     ------
     InputError
-        If it lies outside the flight's time, a number is not finite, or it turns faster than anything flies.
+        If it lies outside the flight's time, or a number is not finite.
+
+    Warns
+    -----
+    ReferenceWarning
+        If it turns faster than gyros measure: mostly its yaw is in degrees.
     """
     source = scenario[REFERENCE].make() if source is None else source
     _require_in_flight(source, scenario.duration)
@@ -52,9 +58,11 @@ def reference_of(scenario: Scenario, source: ReferenceSource | None = None) -> A
         )
     fast = int(np.argmax(np.abs(table.yaw_rate)))
     if abs(float(table.yaw_rate[fast])) > FASTEST_YAW:
-        raise InputError(
+        warnings.warn(
             f"reference: it turns at {in_radians(float(table.yaw_rate[fast]), 'rad/s')}, at t = {times[fast]:g} s; "
-            f"allowed: up to {FASTEST_YAW:.3g} rad/s; give yaw in rad, and more time to turn"
+            f"gyros measure up to {FASTEST_YAW:.3g} rad/s; give yaw in rad, or more time to turn",
+            ReferenceWarning,
+            stacklevel=2,
         )
     return rows
 
