@@ -41,8 +41,11 @@ def rows_of(study: Study) -> Rows:
     return rows
 
 
-AXES = [{"name": "loss", "values": [0.35, 0.6]}, {"name": "detection_delay", "values": [0.1, 0.5, 0.8, 1.5]}]
-SETTINGS = {"diagnosis.kind": "delayed", "sensors.kind": "ideal", "ground": -1.0}
+AXES = [{"name": "loss", "values": [0.35, 0.6]}, {"name": "detection_delay", "values": [0.1, 0.55, 0.8, 1.5]}]
+# With Euler angles, under which heading and place suffer by degrees from what is known late; the ground far below.
+SETTINGS = {
+    "diagnosis.kind": "delayed", "sensors.kind": "ideal", "ground": -20.0, "controller.cascade.tracking": "euler",
+}  # fmt: skip
 LATE = study_of(AXES, **SETTINGS)
 
 
@@ -63,7 +66,7 @@ def test_recovery_is_the_time_from_the_onset_until_the_error_stays_small(late: R
     at_once, later, latest, *never = (row["recovery_time"] for row in late)
     assert at_once == 0.0 < 1.0 < later < latest
     assert np.isnan(never).all()
-    assert [row["survived"] for row in late[3:]] == [True, True, False, False, False]
+    assert [row["survived"] for row in late[3:]] == [True] * 4 + [False]
 
 
 def test_recovery_does_not_depend_on_what_is_recorded(late: Rows) -> None:
@@ -72,26 +75,24 @@ def test_recovery_does_not_depend_on_what_is_recorded(late: Rows) -> None:
 
 
 def test_grades_of_flights_that_end_differently(late: Rows) -> None:
-    assert [row["grade"] for row in late] == ["held"] * 2 + ["yaw given up"] * 2 + ["drifted"] + ["crashed"] * 2 + [
-        "lost"
-    ]
-    assert [row["outcome"] for row in late] == ["settled"] * 3 + ["offset"] * 2 + ["ground"] * 2 + ["tumbled"]
+    assert [row["grade"] for row in late] == ["held"] + ["yaw given up"] * 3 + ["drifted"] * 3 + ["lost"]
+    assert [row["outcome"] for row in late] == ["settled"] * 3 + ["offset"] * 4 + ["tumbled"]
     assert [row["success"] for row in late] == [True] * 4 + [False] * 4
-    assert [row["survived"] for row in late] == [True] * 5 + [False] * 3
-    assert max(row["late_position_rms"] for row in late[:2]) < HELD
-    assert max(row["late_yaw_rms"] for row in late[:2]) < YAW
-    assert min(row["late_yaw_rms"] for row in late[2:4]) > YAW
+    assert [row["survived"] for row in late] == [True] * 7 + [False]
+    assert late[0]["late_position_rms"] < HELD
+    assert late[0]["late_yaw_rms"] < YAW < min(row["late_yaw_rms"] for row in late[1:4])
     assert HELD < late[3]["late_position_rms"] < BOUNDED
 
 
 @pytest.mark.parametrize("success", [SUCCESS, ("held",), ("drifted",), ("controlled descent",), GRADES])
 def test_success_is_for_the_study_to_say_and_survival_is_not(success: tuple[str, ...]) -> None:
-    """The first is far lighter than believed and flies away; the second sinks to the ground from just above it."""
-    place = {f"{key}.position": (0.0, 0.0, 0.1) for key in ("start", "reference")}
+    """The first is far lighter than believed and flies away; the second has too little thrust, and sinks to the ground."""
+    place = {f"{key}.position": (0.0, 0.0, 0.3) for key in ("start", "reference")}
+    sound = {"fault.0.loss": 0.0, "fault.0.time": 0.0}
     (away,) = rows_of(study_of([{"name": "mass", "values": [0.4]}], success, **{"fault.0.loss": 0.0}))
-    (down,) = rows_of(study_of([{"name": "loss", "values": [0.9]}], success, **place))
+    (down,) = rows_of(study_of([{"name": "battery_sag", "values": [0.6]}], success, **place, **sound))
     assert (away["grade"], away["outcome"], away["survived"]) == ("drifted", "offset", True)
     assert (down["grade"], down["outcome"], down["survived"]) == ("controlled descent", "ground", False)
     assert (away["success"], down["success"]) == ("drifted" in success, "controlled descent" in success)
-    assert down["altitude_lost"] == pytest.approx(0.1, abs=0.02)
+    assert down["altitude_lost"] == pytest.approx(0.3, abs=0.02)
     assert away["altitude_lost"] < 0.02
