@@ -86,7 +86,7 @@ def test_grades_of_flights_that_end_differently(late: Rows) -> None:
 
 @pytest.mark.parametrize("success", [SUCCESS, ("held",), ("drifted",), ("controlled descent",), GRADES])
 def test_success_is_for_the_study_to_say_and_survival_is_not(success: tuple[str, ...]) -> None:
-    """The first is far lighter than believed and flies away; the second has too little thrust, and sinks to the ground."""
+    """The first is far lighter than believed and flies away; the second lacks thrust and sinks to the ground."""
     place = {f"{key}.position": (0.0, 0.0, 0.3) for key in ("start", "reference")}
     sound = {"fault.0.loss": 0.0, "fault.0.time": 0.0}
     (away,) = rows_of(study_of([{"name": "mass", "values": [0.4]}], success, **{"fault.0.loss": 0.0}))
