@@ -23,7 +23,7 @@ from rotorfault.flight.assembly import assemble
 from rotorfault.flight.check_block import check_block
 from rotorfault.flight.rules import float_settings, nudged
 from rotorfault.maths.records import flatten, unflatten
-from rotorfault.plant import PLANT
+from rotorfault.plant import GROUND, PLANT
 from rotorfault.scenario.scenario import Mismatch, Scenario, scenario_from
 from rotorfault.scenario.slots import SLOTS
 
@@ -59,6 +59,8 @@ def scenario(folder: Path, parts: Parts) -> Scenario:
     for slot in SLOTS:
         if slot.name in parts:
             part = part_of(slot, parts[slot.name], folder)
+            if slot is GROUND:  # below any reference
+                part = part.with_settings(part.settings.model_copy(update={"height": -5.0}))
             tables[slot.name] = [part] if slot.many else part
     return scenario_from(tables, "test")
 
