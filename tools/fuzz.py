@@ -52,8 +52,7 @@ def fuzz(kind: Kind, number: int, counts: collections.Counter[str], failures: di
             frames = traceback.extract_tb(error.__traceback__)
             own = [frame for frame in frames if "rotorfault" in frame.filename] or frames
             where = f"{Path(own[-1].filename).name}:{own[-1].lineno}"
-            key = f"{kind.name}: {type(error).__name__} at {where}: {' '.join(str(error).split())[:80]}"
-            key = f"{kind.name} {type(error).__name__} {where}"
+            key = f"{kind.name}: {type(error).__name__} at {where}"
             if key not in failures:
                 told = "".join(traceback.format_exception(error)[-4:])
                 failures[key] = f"{place}\n  {repr_of(value)}\n  {told}"

@@ -5,6 +5,7 @@ Everything is drawn by Hypothesis, so an example is repeated by its seed and mad
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import math
@@ -142,7 +143,8 @@ def changed(draw: Draw, tables: Any, most: int = 3) -> Any:
         )
         if what == "scale" and isinstance(here[key], (int, float)) and not isinstance(here[key], bool):
             power = draw(st.integers(-18, 18))
-            here[key] = float(here[key] or 1.0) * draw(st.sampled_from([1.0, -1.0])) * 10.0**power
+            size = here[key] if abs(here[key]) < 1e300 else 1.0
+            here[key] = float(size or 1.0) * draw(st.sampled_from([1.0, -1.0])) * 10.0**power
         elif what in ("scale", "edge"):
             here[key] = draw(edges)
         elif what == "hostile":
@@ -153,7 +155,8 @@ def changed(draw: Draw, tables: Any, most: int = 3) -> Any:
             here[draw(words)] = draw(single)
         elif what == "swap":
             other, place = draw(st.sampled_from(places))
-            here[key] = copy.deepcopy(_at(made, other)[place])
+            with contextlib.suppress(RecursionError):  # of what is nested too deeply to be copied
+                here[key] = copy.deepcopy(_at(made, other)[place])
         else:
             here[key] = [here[key]]
     return made

@@ -51,6 +51,11 @@ def short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+def as_text(value: object) -> str:
+    """A text as it is, anything else as in a message; `str` writes out no whole number of many thousand digits."""
+    return value if isinstance(value, str) else short(value)
+
+
 def unknown(sort: str, name: object, allowed: list[str]) -> str:
     """One line for a name that does not exist: what came, what is allowed, the nearest.
 
@@ -63,8 +68,7 @@ def unknown(sort: str, name: object, allowed: list[str]) -> str:
     allowed : list of str
         The names that exist.
     """
-    given = name if isinstance(name, str) else short(name)
-    return f"unknown {sort} '{given}'{nearest(name, allowed)} ({choices(allowed)})"
+    return f"unknown {sort} '{as_text(name)}'{nearest(name, allowed)} ({choices(allowed)})"
 
 
 def choices(allowed: Iterable[str]) -> str:
@@ -77,7 +81,7 @@ def nearest(name: object, allowed: Iterable[str]) -> str:
 
     A name is near if it differs by a slip of the keys or two, by capitals, or by what is missing at its end.
     """
-    given, names = (name if isinstance(name, str) else short(name)).lower(), {one.lower(): one for one in allowed}
+    given, names = as_text(name).lower(), {one.lower(): one for one in allowed}
     close = difflib.get_close_matches(given, names, n=1, cutoff=ALIKE)
     close = close or [one for one in names if len(given) >= SHORTENED and one.startswith(given)]
     return f"; did you mean '{names[close[0]]}'?" if close else ""

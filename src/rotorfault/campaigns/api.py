@@ -167,9 +167,9 @@ def campaign(
         checked = study_from(dict(study), "study", allow_code)
     else:
         raise InputError(f"study: got {short(study)}; allowed: a name, a path, tables or a Study")
-    require(vehicle or "", str, "vehicle", "a name, or a path that ends in .toml")
+    require("" if vehicle is None else vehicle, str, "vehicle", "a name, or a path that ends in .toml")
     checked = changed(checked, vehicle, preset, seed, budget).resolved()
-    require(out or "", (str, Path), "out", "the path of a folder")
+    require("" if out is None else out, (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)
     for scenario in checked.scenarios:

@@ -20,7 +20,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
-from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.errors import InputError, as_text, unknown
 from rotorfault.base.number_rule import short
 from rotorfault.campaigns.axes import axis, out_of_range
 from rotorfault.campaigns.grades import GRADES, SUCCESS
@@ -219,7 +219,7 @@ class Study(Strict):
             except InputError as error:
                 raise InputError(f"study '{self.name}': {error}") from None
         for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
-            if str(settings.get("vehicle", "")).endswith(".toml"):
+            if as_text(settings.get("vehicle", "")).endswith(".toml"):
                 settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
         return study_from(tables, self.name, self._allow_code)
 
@@ -247,7 +247,7 @@ class Study(Strict):
     @property
     def scenario_name(self) -> str:
         """Name of what is flown."""
-        return self.scenario if isinstance(self.scenario, str) else str(self.scenario.get("name", "scenario"))
+        return self.scenario if isinstance(self.scenario, str) else as_text(self.scenario.get("name", "scenario"))
 
     @functools.cached_property
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -281,7 +281,7 @@ class Study(Strict):
         tables = self._scenario_tables() if isinstance(self.scenario, str) else copy.deepcopy(self.scenario)
         # Not as overrides of the scenario, which may name code, for a user gives them: a study may be a stranger's.
         override_all(tables, settings)
-        return scenario_from(tables, str(tables.get("name", "scenario")), self._allow_code)
+        return scenario_from(tables, as_text(tables.get("name", "scenario")), self._allow_code)
 
     def _scenario_tables(self) -> dict[str, Any]:
         """The scenario that it names."""
@@ -342,13 +342,13 @@ def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None, 
 
 def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
     """Make the paths in a study file relative to the file."""
-    if str(tables.get("scenario", "")).endswith(".toml"):
+    if as_text(tables.get("scenario", "")).endswith(".toml"):
         tables["scenario"] = str(folder / tables["scenario"])
     variants = tables.get("variant", [])
     for owner in [tables, *(variants if isinstance(variants, list) else [])]:
         settings: Any = owner.get("settings") if isinstance(owner, dict) else None
         for key, value in settings.items() if isinstance(settings, dict) else ():
-            if is_file(value) or (key == "vehicle" and str(value).endswith(".toml")):
+            if is_file(value) or (key == "vehicle" and as_text(value).endswith(".toml")):
                 settings[key] = str(folder / value)
 
 

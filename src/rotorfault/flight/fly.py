@@ -15,7 +15,7 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.base.bounds import require, require_shallow
-from rotorfault.base.errors import InputError, short
+from rotorfault.base.errors import InputError, as_text, short
 from rotorfault.base.foreign import is_own, source_digest
 from rotorfault.base.progress import Bar
 from rotorfault.base.versions import versions
@@ -141,7 +141,7 @@ def prepare(
     override_all(tables, overrides)
     # What is in a checked scenario was allowed when it was checked.
     allowed = isinstance(scenario, Scenario) or allow_code
-    return scenario_from(tables, str(tables.get("name", "scenario")), allowed or named_places(overrides))
+    return scenario_from(tables, as_text(tables.get("name", "scenario")), allowed or named_places(overrides))
 
 
 def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = False) -> Flight:
@@ -180,7 +180,7 @@ def _without_presets(tables: dict[str, Any]) -> None:
     """Say of a scenario's complete tables that they come from no preset that is known: older files name none."""
     for slot in SLOTS:
         part = tables.get(slot.name)
-        if slot.presets is not None and isinstance(part, dict) and slot.presets(str(part.get("kind"))):
+        if slot.presets is not None and isinstance(part, dict) and slot.presets(as_text(part.get("kind"))):
             part.setdefault("preset", NO_PRESET)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicSpline
 
+from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
 
 Flags = NDArray[np.bool_]
@@ -43,17 +44,23 @@ class Curve:
     times, values : ndarray, shape (n,)
     rates, accelerations : ndarray, shape (n,), or None
         Accelerations only with rates.
+
+    Raises
+    ------
+    InputError
+        If the numbers are so large, or the times so close, that no curve can be computed.
     """
 
     def __init__(self, times: Array, values: Array, rates: Array | None, accelerations: Array | None) -> None:
         self._first, self._last = float(times[0]), float(times[-1])
-        curve: Any
-        if rates is None:
-            curve = _spline(times, values)
-        else:
-            columns = [values, rates] if accelerations is None else [values, rates, accelerations]
-            curve = BPoly.from_derivatives(times, np.stack(columns, axis=1))
-        self._derivatives = [curve, curve.derivative(1), curve.derivative(2)]
+        try:
+            with np.errstate(all="ignore"):
+                curve = _joined(times, values, rates, accelerations)
+                self._derivatives = [curve, curve.derivative(1), curve.derivative(2)]
+        except (ValueError, np.linalg.LinAlgError):
+            raise InputError(
+                "no smooth curve goes through the rows: their numbers are too large, or their times too close"
+            ) from None
 
     def evaluate(self, times: Array) -> Array:
         """Value, rate and acceleration, shape (3, n); at rest before the first and after the last given instant."""
@@ -61,6 +68,14 @@ class Curve:
         result = np.stack([derivative(np.clip(times, self._first, self._last)) for derivative in self._derivatives])
         result[1:, ~inside] = 0.0
         return result
+
+
+def _joined(times: Array, values: Array, rates: Array | None, accelerations: Array | None) -> Any:
+    """The curve itself, of one of SciPy's kinds."""
+    if rates is None:
+        return _spline(times, values)
+    columns = [values, rates] if accelerations is None else [values, rates, accelerations]
+    return BPoly.from_derivatives(times, np.stack(columns, axis=1))
 
 
 class _Rows(NamedTuple):

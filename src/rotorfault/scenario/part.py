@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, in_words, passed_on, refusal
-from rotorfault.base.errors import InputError, choices, unknown
+from rotorfault.base.errors import InputError, as_text, choices, short, unknown
 from rotorfault.base.registry import Kind
 from rotorfault.model.slot import Slot
 
@@ -189,7 +189,7 @@ def change_preset(slot: Slot[Any], table: dict[str, Any], preset: str) -> None:
 
 def _beside_preset(slot: Slot[Any], table: Mapping[str, Any]) -> dict[str, Any]:
     """Settings in the table of a part that its preset did not give."""
-    kind, preset = str(table.get("kind", slot.default)), table.get("preset")
+    kind, preset = as_text(table.get("kind", slot.default)), table.get("preset")
     own = {key: value for key, value in table.items() if key not in ("kind", "preset")}
     if preset is None or slot.presets is None or kind not in slot.registry:
         return own
@@ -248,7 +248,7 @@ def _with_preset(
     """Name of the preset, and the settings with it put under them."""
     known = {} if slot.presets is None else slot.presets(kind)
     if preset is not None and not isinstance(preset, str):
-        raise refusal("preset", f"got {preset!r}; allowed: the name of a preset")
+        raise refusal("preset", f"got {short(preset)}; allowed: the name of a preset")
     if preset is None:
         preset = DEFAULT_PRESET if DEFAULT_PRESET in known else NO_PRESET if known else ""
     if preset in known:
