@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import h5netcdf
+import h5py
 import xarray as xr
 
 from rotorfault.base.bounds import require
@@ -86,6 +87,9 @@ def _from(path: Path, read: Callable[[Path], Content]) -> Content:
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a flight.nc that 'rotorfault fly' wrote")
     try:
+        # First by h5py alone: an h5netcdf file that could not be opened prints a traceback when it is collected.
+        with h5py.File(path, "r"):
+            pass
         return read(path)
     except Exception as error:
         # h5py and xarray raise a dozen kinds for files that are truncated or no HDF5 at all.
