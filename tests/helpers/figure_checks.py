@@ -15,7 +15,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from rotorfault.results.whole import NUMBERS, TEXTS
+from rotorfault.results.whole import COUNTED, NUMBERS, TEXTS
 
 ONSET, THRESHOLD = 1.8, 0.12
 UNIT = re.compile(r"\(.+\)$")
@@ -41,10 +41,11 @@ def made_up(
         put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
         put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
     put("controller.lyapunov", np.exp(-time) + 1e-6)
-    given_too: dict[str, object] = dict.fromkeys((*TEXTS, *NUMBERS), 0.0)
+    given_too: dict[str, object] = {**dict.fromkeys(TEXTS, "made up"), **dict.fromkeys(NUMBERS, 0.0)}
     given_too |= {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
     begun = onset if onset < duration else None
-    given_too["scores"] = json.dumps({"onset.1": begun, "onset.2": None, "onset.3": begun, "onset.4": None})
+    counted: dict[str, object] = {"outcome": "settled", "survived": True, **dict.fromkeys(COUNTED)}
+    given_too["scores"] = json.dumps(counted | {"onset.1": begun, "onset.2": None, "onset.3": begun, "onset.4": None})
     return dataset(signals, time, given_too | attributes)
 
 

@@ -28,7 +28,7 @@ TEXTS = ("scenario", "controller", "plant", "engine", "version", "outcome", "sco
 NUMBERS = ("seed", "end_time")
 """Attributes that the summary of a flight needs."""
 _OUTCOMES = (*SURVIVED, *ENDS[1:], INTERRUPTED)
-_SCORES = (
+COUNTED = (
     *(f"settle_time.{name}" for name in (*AXES, "overall")),
     *(f"{group}.{axis}" for group in ("position_mse", "position_error_end") for axis in AXES),
     *(f"{group}.{angle}" for group in ("attitude_mse", "attitude_end") for angle in ANGLES),
@@ -61,6 +61,7 @@ def _signals(data: FlightData) -> Iterator[str]:
         return
     if (np.diff(times) <= 0.0).any():
         yield "signal 'time' does not rise"
+    known = {signal.name for signal in signals_of(LoopSignals)}
     for signal in signals_of(LoopSignals):
         if signal.name not in data.variables:
             yield f"signal '{signal.name}' is missing"
@@ -73,7 +74,9 @@ def _signals(data: FlightData) -> Iterator[str]:
         if variable.dims[:1] != ("time",) or np.asarray(variable.values).dtype.kind != "f":
             yield f"signal '{one_line(name)}' holds no numbers over time"
         for attribute in ("units", "long_name"):
-            if not isinstance(variable.attrs.get(attribute), str):
+            # A signal that somebody added need not say what it means.
+            missing = "" if name not in known else None
+            if not isinstance(variable.attrs.get(attribute, missing), str):
                 yield f"signal '{one_line(name)}' has no attribute '{attribute}'"
 
 
@@ -107,7 +110,7 @@ def scores(attributes: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
     """
     found = json_table(attributes, "scores", path)
     landing = [f"landing.{name}" for name in LANDING] if "landing.confirmed_time" in found else []
-    for name in ("outcome", "survived", *_SCORES, *landing):
+    for name in ("outcome", "survived", *COUNTED, *landing):
         if name not in found:
             raise InputError(f"{path}: attribute 'scores' lacks '{name}'; {HINT}")
     for name, value in found.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -180,7 +181,8 @@ def test_an_error_that_is_missing_is_said() -> None:
 
 def test_a_flight_lost_at_1_ms_is_drawn_to_its_end(results: dict[str, Result], tmp_path: Path) -> None:
     short = results["square-smc-1ms"].data().isel(time=slice(300))
-    save(short.assign_attrs(outcome="tumbled", end_time=2.99), tmp_path / "lost.nc")
+    counted = json.loads(short.attrs["scores"]) | {"outcome": "tumbled", "survived": False}
+    save(short.assign_attrs(outcome="tumbled", end_time=2.99, scores=json.dumps(counted)), tmp_path / "lost.nc")
     lost = results["square-smc-1ms"]._replace(path=tmp_path / "lost.nc")
     made = figures.draw_all({i: r for i, r in (results | {"square-smc-1ms": lost}).items() if i.startswith("square")})
     for key in ("fig13", "fig14", "fig15"):
