@@ -75,6 +75,14 @@ def row(*cells: object) -> None:
     print("  ".join(f"{cell!s:>14s}" for cell in cells), flush=True)
 
 
+def bodies(vary: dict[str, Array], vehicle: str) -> dict[str, Array]:
+    """The same factors, none beyond what a body can have: no moment is above the sum of the other two."""
+    J = np.array(list(load_vehicle(vehicle).vehicle.inertia))
+    moments = np.stack(list(vary.values())) * J[:, None]
+    moments = np.minimum(moments, 0.999 * (moments.sum(axis=0) - moments))
+    return dict(zip(vary, moments / J[:, None], strict=True))
+
+
 def healthy(flights: int, duration: float) -> None:
     """Print a row for each vehicle, controller and path."""
     row("vehicle", "law", "path", "alarms/h", "95 %", "lost with", "without", "only with")
@@ -83,10 +91,7 @@ def healthy(flights: int, duration: float) -> None:
             for name, path in (("square", SQUARE), ("waypoints", waypoints(duration))):
                 rng = np.random.default_rng(len(name))
                 vary = {f"mismatch.inertia.{axis}": rng.uniform(0.8, 1.2, flights) for axis in range(3)}
-                J = rf.load_vehicle(vehicle).vehicle.inertia
-                # No body has a moment above the sum of the other two.
-                most = (vary["mismatch.inertia.0"] * J.x + vary["mismatch.inertia.1"] * J.y) / J.z
-                vary["mismatch.inertia.2"] = np.minimum(vary["mismatch.inertia.2"], 0.999 * most)
+                vary = bodies(vary, vehicle)
                 vary |= {"mismatch.rotor_bandwidth": rng.uniform(0.7, 1.4, flights), "seed": np.arange(flights)}
                 tables = {
                     "name": "healthy",

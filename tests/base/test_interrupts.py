@@ -39,7 +39,8 @@ class Careless:
 def test_an_interrupt_that_a_finalizer_drops_is_raised_anew(capsys: pytest.CaptureFixture[str]) -> None:
     def throw_away() -> None:
         Careless()
-        time.sleep(60.0)
+        for _ in range(200):
+            time.sleep(0.05)
 
     with interrupts.watched(), pytest.raises(KeyboardInterrupt):
         throw_away()

@@ -153,7 +153,7 @@ def test_twins_are_seen_under_other_names() -> None:
 @pytest.mark.parametrize(
     ("pattern", "homes"),
     [
-        (r"h5py\.File\(|to_netcdf\(", {"results/netcdf.py"}),
+        (r"h5py\.File\([^)]*\"w\"|to_netcdf\(", {"results/netcdf.py"}),
         (r"^from llvmlite|^import llvmlite", {"engine/native.py"}),
         (r"multiprocessing|ProcessPoolExecutor", {"base/executors.py"}),
         (r"SeedSequence|default_rng|Philox\(", {"campaigns/flight_set.py", "scenario/neighbours.py",
