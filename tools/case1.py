@@ -28,7 +28,7 @@ ROWS: list[tuple[str, dict[str, Any]]] = [
     ("ROISMC, paper's reallocation", {"allocation.kind": "paper_rule"}),
     ("ROISMC, nominal allocation", {"allocation.kind": "nominal"}),
     ("ROISMC, preset paper", {"controller.preset": "paper"}),
-    ("ROISMC, six inputs", {"controller.cascade": {"six_inputs": True}}),
+    ("ROISMC, six inputs", {"controller.cascade.six_inputs": True}),
     ("ROISMC, updraught 3.6 m/s", {"wind.velocity_W": [-3.33, 1.36, 3.6]}),
     ("ROISMC, downdraught 3.6 m/s", {"wind.velocity_W": [-3.33, 1.36, -3.6]}),
     ("ROISMC, k_d = 0.3, wind along +x", {"mismatch.linear_drag": 2.128, "wind.velocity_W": [3.6, 0.0, 0.0]}),
