@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import matplotlib
 import pytest
 from command_line import assert_refused, run, started
 
@@ -70,9 +71,13 @@ def test_a_terminal_of_few_characters_gets_the_others_written_out(
         "NO_COLOR": "1",
     }.items():
         monkeypatch.setenv(name, value)
+    # Without a home Matplotlib would look for all fonts anew, which takes most of the time.
+    monkeypatch.setenv("MPLCONFIGDIR", matplotlib.get_cachedir())
     monkeypatch.delenv("HOME", raising=False)
     out = str(tmp_path / "zürich")
-    done = started("fly", "paper-set-point", "--set", "duration=0.1", "--set", "fault=[]", "--out", out)
+    # And there is no cache of compiled loops.
+    short = ("--engine", "python", "--set", "duration=0.1", "--set", "fault=[]")
+    done = started("fly", "paper-set-point", *short, "--out", out)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "zürich" / "position.png").is_file()
     done = started("compare", f"{out}/flight.nc", f"{out}/flight.nc", "--out", str(tmp_path / "both"))

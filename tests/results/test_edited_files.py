@@ -109,6 +109,11 @@ def test_files_without_digests_say_what_is_wrong_with_them(
     with pytest.raises(rf.InputError, match=words) as refused:
         rf.load(path)
     assert str(refused.value).isprintable()
+
+
+@pytest.mark.parametrize("edit", [UNREADABLE[0][0], UNREADABLE[-1][0]], ids=["scores", "signal"])
+def test_commands_refuse_them_in_a_line(edit: Callable[[Any], object], written: Path, tmp_path: Path) -> None:
+    path = edited(written, tmp_path, edit, sealed=False)
     assert_refused(run("compare", str(path), str(written), "--no-figures"), "flight.nc")
     assert_refused(run("export", str(path), "--to", "csv"), "flight.nc")
 
