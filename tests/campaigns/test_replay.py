@@ -38,7 +38,7 @@ SCORES = {"outcome": "offset", "survived": True, "recovery_time": 0.25, "tilt_ma
         ({}, []),
         ({"tilt_max": 0.1 * (1.0 + 0.5 * AGREE)}, []),
         ({"cost": NAN}, []),  # no number on both sides: a controller without a cost
-        ({"control_total_variation": None}, []),
+        ({"command_rate": None}, []),
         ({"tilt_max": 0.1 * (1.0 + 2.0 * AGREE)}, ["tilt_max is 0.1000000002 here and 0.1 in the table"]),
         ({"position_mse.x": 3e-3}, ["position_mse.x is 0.003 here and 0.002 in the table"]),
         ({"cost": 1.0}, ["cost is 1.0 here and None in the table"]),

@@ -256,7 +256,7 @@ def test_presets_on_an_axis_are_flown() -> None:
     settings = {**TINY["settings"], "fault.0.loss": 0.2}
     study = tiny(axis=[{"name": "preset", "values": ["tuned", "gentle"]}], draw=[], settings=settings).resolved()
     table = fly_block(study, FlightSet(np.array([0, 0]), np.array([0, 1]), np.array([0, 0])))
-    assert len(set(table["control_total_variation"].to_pylist())) == 2
+    assert len(set(table["command_rate"].to_pylist())) == 2
     for row in table.to_pylist():
         flight = rotorfault.fly(
             "hover-fault", settings={**settings, "controller.preset": row["preset"], "seed": row["seed"]}

@@ -54,7 +54,8 @@ def scored(time: Array = TIME, tables: dict[str, Any] | None = None, **values: A
     ground = float((tables or {}).get("ground", 0.0))
     start, vehicle = rows[0, layout.place("position")], batch.parameters.belief
     bottom, weight = ground - 0.1, vehicle.mass * vehicle.gravity
-    scoring = scoring_parameters(start, vehicle.thrust_min, vehicle.thrust_max, bottom, weight, reference)
+    limits, hover = (vehicle.thrust_min, vehicle.thrust_max), weight / 4.0 / vehicle.rotor_gain
+    scoring = scoring_parameters(start, *limits, bottom, weight, hover, reference)
     parameters = batch.parameters._replace(scoring=scoring)
     _, _, template = batch.loop.decide(batch.state, batch.loop.drive(), parameters)
     onsets, scores = batch.loop.onsets(parameters.parts), batch.state.scores

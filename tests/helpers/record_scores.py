@@ -73,10 +73,20 @@ def from_records(scenario: Scenario, signals: Mapping[str, Array], outcome: str)
         "tilt_end": np.arccos(np.clip(up(s["quaternion"][-1]), -1.0, 1.0)),
         "tilt_max": np.arccos(np.clip(up(s["quaternion"][air]).min(), -1.0, 1.0)),
         "lowest": s["position"][air, 2].min(),
-        "control_total_variation": np.abs(np.diff(s["thrust_command"][air], axis=0)).sum(),
         "given_up_fraction": np.mean(s["given_up"][air], axis=0),
     }
     vehicle = scenario.vehicle.vehicle
+    changes = np.abs(np.diff(s["thrust_command"][air], axis=0)).sum() / 4.0
+    hover = vehicle.mass * vehicle.gravity / (4.0 * vehicle.rotor_gain)
+    found["command_step"] = changes / (hover * max(int(air.sum()) - 1, 1))
+    found["command_rate"] = found["command_step"] / scenario.period
+    start = np.array(scenario.start.position)
+    wanted = s["position_reference"]
+    if "landing_stage" in s:
+        wanted = wanted[s["landing_stage"] < 0.5]  # from then on it is the response's
+    moves = (np.ptp(wanted, axis=0) > 0.0).any()
+    asked = np.ptp(wanted, axis=0) if moves else np.abs(wanted[0] - start)
+    found["reference_step"] = asked.max()
     room = ROUNDING * max(1.0, vehicle.thrust_max)
     at_limit = (s["thrust_command"] <= vehicle.thrust_min + room) | (s["thrust_command"] >= vehicle.thrust_max - room)
     found["saturated_fraction"] = np.mean(at_limit[air].any(axis=1))
@@ -147,7 +157,7 @@ def detections(scenario: Scenario, s: Mapping[str, Array], time: Array, air: Arr
     rises = np.diff(s["fault_flag"], axis=0, prepend=0.0) > 0.5
     columns = {name: [np.nan] * 4 for name in ("onset", "detected", "loss_true", "loss_believed", "loss_error")}
     false = 0
-    lowest, here = np.nan, time[air]
+    excursion, drop, here = np.nan, np.nan, time[air]
     for rotor in range(4):
         begun = here >= onsets.get(rotor + 1, np.inf) - ROUNDING
         false += int((rises[air, rotor] & ~begun).sum())
@@ -165,8 +175,9 @@ def detections(scenario: Scenario, s: Mapping[str, Array], time: Array, air: Arr
     earliest = min(onsets.values(), default=np.inf)
     struck = here >= earliest - ROUNDING
     if struck.any():
-        lowest = s["position"][air, 2][struck].min()
-    return columns | {"false_alarms": false, "lowest_after_loss": lowest}
+        error = (s["position"] - s["position_reference"])[air][struck]
+        excursion, drop = np.linalg.norm(error, axis=1).max(), max(0.0, -error[:, 2].min())
+    return columns | {"false_alarms": false, "excursion": excursion, "altitude_lost": drop}
 
 
 def recovery(scenario: Scenario, error: Array, first: float, touched: Array, outcome: str) -> float:

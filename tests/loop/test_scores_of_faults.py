@@ -234,7 +234,7 @@ def ends_at(stage: Any, force: Any) -> tuple[int, int] | None:
     """Step at which scoring ends a flight of 200 periods of 10 ms, and how; None if it does not."""
     scoring = Scoring(ground=True, lands=True)
     scores, still = scoring.initial(), example(LoopSignals)._asdict()
-    parameters = ScoringParameters(zeros(), zeros(), 100.0, -1.0, 1e3, 0.0, touch=0.5)
+    parameters = ScoringParameters(zeros(), zeros(), 100.0, -1.0, 1e3, 0.0, touch=0.5, hover=1.0, step=0.0)
     for k, (at, push) in enumerate(zip(np.broadcast_to(stage, 200), np.broadcast_to(force, 200), strict=True)):
         seen = SimpleNamespace(**still, parts=(), landing_stage=float(at), ground_force=float(push))
         scores = scoring.step(scores, seen, parameters, (), float(k), k * 0.01, 0.01)

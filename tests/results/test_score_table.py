@@ -12,6 +12,7 @@ from made_up_scores import TIME, Array, scored, steps, summarised
 from scipy.spatial.transform import Rotation
 
 from rotorfault.loop.scores import SETTLED, TRACKED, bands
+from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.results.outcome import Outcome, finite_or_none
 
 AXES = ("x", "y", "z")
@@ -305,7 +306,9 @@ def test_summary_of_simple_signals() -> None:
     assert summary["given_up_fraction"] == pytest.approx({"tilt": 1 / 101, "thrust": 0.0, "yaw": 100 / 101})
     assert summary["largest_riccati_residual"] == pytest.approx(1e-3)
     assert summary["riccati_guarded_fraction"] == pytest.approx(5 / 101)
-    assert summary["control_total_variation"] == pytest.approx(1.0 + (4.0 + 4.18 + 0.0 + 0.5))
+    hover = load_vehicle("paper").vehicle.mass * 9.81 / 4.0
+    assert summary["command_step"] == pytest.approx((1.0 + (4.0 + 4.18 + 0.0 + 0.5)) / 4.0 / 100.0 / hover, rel=1e-3)
+    assert summary["command_rate"] == pytest.approx(summary["command_step"] / 0.1)
     assert summary["saturated_fraction"] == pytest.approx(50 / 101)
 
 
@@ -314,11 +317,15 @@ def test_tilt_is_that_of_the_thrust_axis() -> None:
     assert row["tilt_max"] == pytest.approx(math.acos(math.cos(0.3) * math.cos(0.4)))
 
 
-def test_the_lowest_height_is_counted_over_the_flight_and_after_the_fault() -> None:
+def test_excursion_and_altitude_lost_are_counted_from_the_fault_on() -> None:
     height = np.select([TIME < 1.0, TIME < 5.0 - 1e-9], [-0.7, 0.5], 0.2)
     row = scored(tables=faults((2, 3.0)), position=np.outer(height, [0.0, 0.0, 1.0]))
-    assert (row["lowest"], row["lowest_after_loss"]) == (-0.7, 0.2)
-    assert math.isnan(scored(position=np.outer(height, [0.0, 0.0, 1.0]))["lowest_after_loss"])
+    assert (row["lowest"], row["excursion"], row["altitude_lost"]) == (-0.7, 0.5, 0.0)
+    below = scored(tables=faults((2, 3.0)), position=np.outer(-height, [0.0, 3.0, 1.0]))
+    assert (below["altitude_lost"], below["excursion"]) == pytest.approx((0.5, 0.5 * math.sqrt(10.0)))
+    sound = scored(position=np.outer(height, [0.0, 0.0, 1.0]))
+    assert math.isnan(sound["excursion"])
+    assert math.isnan(sound["altitude_lost"])
 
 
 def test_nothing_is_counted_once_a_flight_is_over() -> None:

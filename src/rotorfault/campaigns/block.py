@@ -13,12 +13,11 @@ from rotorfault.campaigns.flight_set import FlightSet, identifiers, seeds, value
 from rotorfault.campaigns.grades import grades
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.many import fly_many
-from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import ScoreTable
 
 METRICS = (
-    "end_time", "cost", "tilt_max", "control_total_variation", "saturated_fraction", "outside_layer_fraction",
-    "false_alarms", "largest_riccati_residual", "late_position_rms", "late_yaw_rms", "lowest_after_loss",
+    "end_time", "cost", "tilt_max", "command_rate", "saturated_fraction", "outside_layer_fraction",
+    "false_alarms", "largest_riccati_residual", "late_position_rms", "late_yaw_rms", "excursion",
     "position_mse.x", "position_mse.y", "position_mse.z", "given_up_fraction.yaw",
 )  # fmt: skip
 """Columns of `ScoreTable` that are kept; dots become underscores."""
@@ -50,13 +49,11 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
     values, seed = values_of(study, flights), seeds(study, flights)
     settings = {**columns(values), "seed": seed}
     parts: list[tuple[NDArray[np.intp], ScoreTable]] = []
-    heights = np.empty(flights.size)
     for variant in np.unique(flights.variant):
         which = np.flatnonzero(flights.variant == variant)
         scenario = study.scenarios[variant]
         varied = {key: column[which] for key, column in settings.items()}
         parts.append((which, fly_many(scenario, varied, threads=threads).table))
-        heights[which] = scenario[REFERENCE].make().table(np.zeros(1)).p_W[0, 2]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
     grade = grades(table)
@@ -73,7 +70,7 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         "survived": table["survived"],
         "outcome": table["outcome"],
         "recovery_time": table["recovery_time"],
-        "altitude_lost": altitudes_lost(table, heights),
+        "altitude_lost": table["altitude_lost"],
         **{name.replace(".", "_"): _metric(table, name) for name in METRICS},
     }
     return pa.table({name: _column(values) for name, values in rows.items()})
@@ -82,11 +79,6 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
 def _metric(table: ScoreTable, name: str) -> NDArray[Any]:
     """A column of the scores; NaN for controllers that have no such number."""
     return table[name] if name in table else np.full(len(table), np.nan)
-
-
-def altitudes_lost(table: ScoreTable, height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far in m flights fell below a height, where their reference begins, once a fault had begun; else NaN."""
-    return np.asarray(np.maximum(height - table["lowest_after_loss"], 0.0))
 
 
 def _column(values: NDArray[Any]) -> pa.Array:

@@ -26,6 +26,7 @@ from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Context, Record
 from rotorfault.model.slot import Slot
+from rotorfault.model.vehicle import hover_thrust
 from rotorfault.plant.ground import GROUND
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
@@ -228,6 +229,7 @@ class _Assembly:
             believed.thrust_max,
             0.0 if ground is None else ground.bottom(parameters.parts.ground),
             true.mass * true.gravity,
+            hover_thrust(believed).r1 / believed.rotor_gain,
             reference,
         )
         parameters = parameters._replace(scoring=scoring)

@@ -56,11 +56,13 @@ class ScoringParameters(NamedTuple):
     command_high: Scalar  # N: commands at or above do
     bottom: Scalar  # m: height below which the vehicle is in the ground, not on it; unread without ground
     touch: Scalar  # N: upward force of the ground with which it touches; unread without ground
+    hover: Scalar  # N: command of a rotor in hover
+    step: Scalar  # m: largest step or span that the reference asks for; 0 for a hover where it starts
 
 
 def unjudged() -> ScoringParameters:
     """For a loop whose scores nobody reads."""
-    return ScoringParameters(zeros(), zeros(), 0.0, 0.0, math.inf, 0.0, 0.0)
+    return ScoringParameters(zeros(), zeros(), 0.0, 0.0, math.inf, 0.0, 0.0, 1.0, 0.0)
 
 
 class Detection(NamedTuple):
@@ -108,7 +110,8 @@ class Scores(NamedTuple):
     cost_last: Scalar  # and at the last
     cosine_least: Scalar  # of the tilt
     lowest: Scalar  # m
-    lowest_after: Scalar  # m: from the first onset on
+    away: Scalar  # m^2: largest squared distance from the reference from the first onset on
+    drop: Scalar  # m: largest depth below the reference from then on
     variation: Scalar  # N: sum of changes of the commands
     command: PerRotor  # N, at the last instant
     saturated: Scalar  # instants with a command at a limit
@@ -121,6 +124,25 @@ class Scores(NamedTuple):
     detections: tuple[Detection, ...]  # one for each rotor that a fault hits, in the order of their numbers
     landing: Landing | tuple[()]  # where a landing may happen
     signals: Any  # record of what is counted of signals, by name
+
+
+def steps_of(reference: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Step per axis [m] that a constant reference asks for, or the span of one that moves.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (n, 3)
+        Positions in m.
+    start : ndarray, shape (..., 3)
+        Where the flight begins, in m.
+
+    Returns
+    -------
+    ndarray, of the shape of `start`
+    """
+    span = np.ptp(reference, axis=0)
+    constant = bool((span == 0.0).all())
+    return np.asarray(np.abs(reference[0] - start) if constant else np.broadcast_to(span, np.shape(start)))
 
 
 def bands(reference: NDArray[np.float64], start: NDArray[np.float64], share: float) -> NDArray[np.float64]:
@@ -139,8 +161,7 @@ def bands(reference: NDArray[np.float64], start: NDArray[np.float64], share: flo
     -------
     ndarray, of the shape of `start`
     """
-    span = np.ptp(reference, axis=0)
-    size = np.abs(reference[0] - start) if (span == 0.0).all() else np.broadcast_to(span, np.shape(start))
+    size = steps_of(reference, start)
     largest = size.max(axis=-1, keepdims=True)
     return np.asarray(share * np.where(size > 1e-9, size, np.where(largest > 1e-9, largest, 1.0)))
 
@@ -151,6 +172,7 @@ def scoring_parameters(
     thrust_max: Scalar,
     bottom: Scalar,
     weight: Scalar,
+    hover: Scalar,
     reference: NDArray[np.float64],
 ) -> ScoringParameters:
     """What scoring needs to know of a flight.
@@ -165,6 +187,8 @@ def scoring_parameters(
         Height below which the vehicle is in the ground; unread where there is none.
     weight : scalar, N
         The true one.
+    hover : scalar, N
+        Command of a rotor in hover, as the autopilot believes.
     reference : ndarray, shape (steps, 3 or more)
         Its first three columns are positions in m.
     """
@@ -178,4 +202,6 @@ def scoring_parameters(
         command_high=thrust_max - margin,
         bottom=bottom,
         touch=TOUCH * weight,
+        hover=hover,
+        step=steps_of(reference[:, :3], position).max(axis=-1),
     )

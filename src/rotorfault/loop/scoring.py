@@ -15,6 +15,9 @@ and a flight has one set of numbers whatever of it is recorded and how finely.
 - *Settling time* of an axis: from when on the error stays within 2 % of the step on this axis (of the largest step
   where an axis has none; of the span for a moving reference) to the end.
 - *Recovery time*: from the first onset of a fault until the error stays within 0.25 m on each axis to the end.
+- *Excursion*: largest distance from the reference from the first onset on; *altitude lost*: largest depth below it.
+- *Command rate*: change of the commands in a sampling period, mean over rotors and flight, as a share of the thrust
+  of a rotor in hover.
 - *Attitude error*: rotation vector from the attitude that is level at the reference's yaw to the true one, in rad
   about body x, y, z; to first order these are roll, pitch and yaw error, and there is no angle at which it fails.
 - *Yaw error*: angle from the reference's yaw to where the body x axis points, seen from above, the short way round.
@@ -108,8 +111,9 @@ class Scoring:
             over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,
             yaw_error=0.0, position_square=none, attitude_square=none, position_error=none,
             attitude=Quat.identity(), velocity=none,
-            cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, lowest_after=FAR, variation=0.0,
-            command=PerRotor.all(0.0), saturated=0.0, given_up=none, flags=PerRotor.all(0.0), false_alarms=0.0,
+            cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, away=0.0, drop=0.0,
+            variation=0.0, command=PerRotor.all(0.0), saturated=0.0, given_up=none, flags=PerRotor.all(0.0),
+            false_alarms=0.0,
             touched=0.0, gentle=1.0, rest=0.0,
             detections=tuple(Detection(-1.0, 0.0, 0.0, 0.0, 0.0) for _ in self.rotors),
             landing=landing,
@@ -260,7 +264,8 @@ class Scoring:
             cost_last=rate,
             cosine_least=minimum(scores.cosine_least, cosine),
             lowest=minimum(scores.lowest, signals.position.z),
-            lowest_after=select(struck, minimum(scores.lowest_after, signals.position.z), scores.lowest_after),
+            away=select(struck, maximum(scores.away, square.sum()), scores.away),
+            drop=select(struck, maximum(scores.drop, -error.z), scores.drop),
             variation=select(first, 0.0, scores.variation + changes.sum()),
             command=command,
             saturated=scores.saturated + at_limit.reduce(either),

@@ -12,8 +12,11 @@ angle or rotor:
   [rad];
 - ``late_position_rms`` [m] and ``late_yaw_rms`` [rad]: root mean square errors over the last half of the flight (for
   flights that lasted); ``yaw_error_end`` [rad]; ``cost``;
-- ``lowest`` [m], the least height, and ``lowest_after_loss`` [m], the same from the first onset of a fault on;
-- ``control_total_variation`` [N], ``saturated_fraction``, ``given_up_fraction`` by what was cut;
+- ``lowest`` [m], the least height; ``excursion`` and ``altitude_lost`` [m], largest distance from the reference and
+  largest depth below it, from the first onset of a fault on; ``reference_step`` [m], what the reference asks for;
+- ``command_step``, change of a rotor's command from one sampling period to the next, mean over rotors and time, as a
+  share of its command in hover, and ``command_rate`` [1/s], the same per second;
+- ``saturated_fraction``, ``given_up_fraction`` by what was cut;
 - ``onset.R`` and ``detected.R`` [s], when the first fault of rotor R begins and when its flag rose from then on;
   ``loss_true.R``, ``loss_believed.R`` and ``loss_error.R``; ``false_alarms``;
 - ``landing.confirmed_time`` and others, where a landing may happen;
@@ -30,7 +33,7 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.batch import Batch, columns
 from rotorfault.loop.closed_loop import LoopState, no_reference
-from rotorfault.loop.scores import ENDS, FAR, INTERRUPTED, SURVIVED, YAW_KEPT, Scores, ScoringParameters
+from rotorfault.loop.scores import ENDS, INTERRUPTED, SURVIVED, YAW_KEPT, Scores, ScoringParameters
 from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.arrays import ANGLES, AXES, Array
 from rotorfault.maths.records import flatten, unflatten
@@ -130,12 +133,17 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table["cost"] = cost if scoring.has_cost else np.full(batch.flights, np.nan)
         table["tilt_max"] = np.arccos(np.clip(scores.cosine_least, -1.0, 1.0))
         table["lowest"] = scores.lowest
-        table["lowest_after_loss"] = np.where(scores.lowest_after < FAR, scores.lowest_after, np.nan)
-        table["control_total_variation"] = scores.variation
+        table["reference_step"] = parameters.step
+        # The first instant has no change before it.
+        rate = scores.variation / (len(ROTORS) * parameters.hover * np.maximum(scores.seen - 1.0, 1.0))
+        table["command_step"], table["command_rate"] = rate, rate / dt
         table["saturated_fraction"] = scores.saturated * share
         table |= _named("given_up_fraction", GIVEN_UP, [x * share for x in scores.given_up])
         table |= _detections(scoring, scores, onsets, end_time)
         table["recovery_time"] = _recovery(table, scores, batch.steps, dt)
+        struck = np.isfinite(_first_onset(table))
+        table["excursion"] = np.where(struck, np.sqrt(scores.away), np.nan)
+        table["altitude_lost"] = np.where(struck, scores.drop, np.nan)
         table["false_alarms"] = scores.false_alarms.astype(int)
         if scoring.lands:
             table |= _landing(scores, onsets, end_time)
@@ -193,11 +201,16 @@ def _detections(scoring: Scoring, scores: Scores, onsets: Sequence[Any], end_tim
 
 def _recovery(table: Columns, scores: Scores, steps: int, dt: NDArray[Any]) -> NDArray[Any]:
     """Time in s from the first onset until the vehicle is back for good; NaN where it never is, or nothing began."""
-    onsets = np.stack([table[f"onset.{rotor}"] for rotor in ROTORS])
-    first = np.where(np.isnan(onsets), np.inf, onsets).min(axis=0)
+    first = _first_onset(table)
     back = np.where(scores.last_away >= steps - 1, np.nan, (scores.last_away + 1.0) * dt)
     flew = table["survived"] & (scores.touched == 0.0) & np.isfinite(first)
     return np.where(flew, np.maximum(back - first, 0.0), np.nan)
+
+
+def _first_onset(table: Columns) -> NDArray[Any]:
+    """Time in s of the first onset of any fault; infinite where none began."""
+    onsets = np.stack([table[f"onset.{rotor}"] for rotor in ROTORS])
+    return np.asarray(np.where(np.isnan(onsets), np.inf, onsets).min(axis=0))
 
 
 def _landing(scores: Scores, onsets: Sequence[Any], end_time: NDArray[Any]) -> Columns:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from rotorfault.base.plain_text import one_line
+from rotorfault.loop.scores import YAW_KEPT
 
 
 def number(value: float | None, unit: str = "", digits: int = 4) -> str:
@@ -26,10 +27,14 @@ def per_axis(values: dict[str, float | None], unit: str = "", digits: int = 3) -
 
 def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of each line of a summary."""
-    settle = summary["settle_time"]
     found = [
-        ("outcome", f"{summary['outcome']} at {number(summary['end_time'], 's')}"),
-        ("settled within 2 % at", per_axis(settle, "s") if any(v is not None for v in settle.values()) else "never"),
+        ("outcome", f"{summary['outcome']} at {number(summary['end_time'], 's')}{_why(summary)}"),
+        *_fault_rows(summary),
+    ]
+    found += _settling_rows(summary)
+    shares = _given_up(summary).items()
+    given_up = ", ".join(f"{what} {number(100.0 * share, '%', 3)}" for what, share in shares)
+    found += [
         ("position error at the end", per_axis(summary["position_error_end"], "m")),
         ("attitude at the end", per_axis(summary["attitude_end"], "rad")),
         ("position mean square error", per_axis(summary["position_mse"], "m^2")),
@@ -39,9 +44,30 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
             "largest tilt",
             f"{number(summary['tilt_max'], 'rad', 3)} ({number(_degrees(summary['tilt_max']), 'deg', 3)})",
         ),
-        ("total variation of commands", number(summary["control_total_variation"], "N")),
+        (
+            "change of commands",
+            f"{number(summary['command_rate'], digits=3)} of hover thrust per second "
+            f"({number(100.0 * summary['command_step'], '%', 2)} each sampling period)",
+        ),
         ("time with a rotor at its limit", number(100.0 * summary["saturated_fraction"], "%", 3)),
+        ("time with authority given up", given_up or "none"),
     ]
+    if not summary["detections"]:
+        found.append(("false alarms", str(summary["false_alarms"])))
+    if (summary.get("largest_riccati_residual") or 0.0) > 0.0:
+        found.append(("largest Riccati residual", f"{summary['largest_riccati_residual']:.2g}"))
+    return found
+
+
+def _fault_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """What a flight with faults is flown for: how far it was thrown, how soon it was back, what was seen."""
+    if not summary["detections"]:
+        return []
+    found = [("largest excursion after the fault", number(summary["excursion"], "m", 3))]
+    if summary.get("landing") is None:
+        back = summary["recovery_time"]
+        found.append(("back within 0.25 m", _back(back)))
+    found.append(("altitude lost", number(summary["altitude_lost"], "m", 3)))
     for hit in summary["detections"]:
         if hit["detected_time"] is None:
             text = "not detected"
@@ -51,14 +77,38 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
                 f"(true {hit['loss_true']:.3g})"
             )
         found.append((f"fault of rotor {hit['rotor']} at {hit['true_time']:g} s", text))
-    if summary["detections"] and summary.get("landing") is None:
-        found.append(("back within 0.25 m after", number(summary["recovery_time"], "s")))
+    found.append(("false alarms", str(summary["false_alarms"])))
     if summary.get("landing") is not None:
         found += landing_rows(summary["landing"])
-    found.append(("false alarms", str(summary["false_alarms"])))
-    if (summary.get("largest_riccati_residual") or 0.0) > 0.0:
-        found.append(("largest Riccati residual", f"{summary['largest_riccati_residual']:.2g}"))
     return found
+
+
+def _why(summary: dict[str, Any]) -> str:
+    """What keeps a flight that lasted from having settled, if it is the heading."""
+    turned = abs(summary.get("yaw_error_end") or 0.0)
+    return f", yaw {number(turned, 'rad', 3)} off" if summary["outcome"] == "offset" and turned > YAW_KEPT else ""
+
+
+def _back(after: float | None) -> str:
+    """When a vehicle was back from an excursion."""
+    if after is None or not math.isfinite(after):
+        return "never"
+    return "never left it" if after == 0.0 else f"{number(after, 's')} after the fault"
+
+
+def _settling_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """When it settled, if the reference asked for anything."""
+    if summary.get("reference_step") == 0.0:
+        return []
+    times = summary["settle_time"]
+    some = any(value is not None and math.isfinite(value) for value in times.values())
+    return [("settled within 2 % at", per_axis(times, "s") if some else "never")]
+
+
+def _given_up(summary: dict[str, Any]) -> dict[str, float]:
+    """Share of the time in which some of tilt, thrust or yaw was given up, where any was."""
+    shares: dict[str, float] = summary.get("given_up_fraction", {})
+    return {what: share for what, share in shares.items() if share}
 
 
 def landing_rows(landing: dict[str, Any]) -> list[tuple[str, str]]:

@@ -34,7 +34,8 @@ COUNTED = (
     *(f"{group}.{angle}" for group in ("attitude_mse", "attitude_end") for angle in ANGLES),
     *(f"{name}.{rotor}" for name in ("onset", "detected", "loss_true", "loss_believed", "loss_error")
       for rotor in ROTORS),
-    "end_time", "cost", "tilt_max", "control_total_variation", "saturated_fraction", "recovery_time", "false_alarms",
+    "end_time", "cost", "tilt_max", "command_rate", "command_step", "saturated_fraction", "recovery_time",
+    "excursion", "altitude_lost", "reference_step", "false_alarms",
 )  # fmt: skip
 
 

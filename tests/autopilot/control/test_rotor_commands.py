@@ -179,7 +179,7 @@ def test_scores_do_not_ask_where_the_commands_came_from() -> None:
         for made in (RotorSpringBlock(), SpringBlock())
     )
     assert own["outcome"] == by_wrench["outcome"]
-    for name in ("position_mse.x", "attitude_mse.roll", "tilt_max", "control_total_variation", "late_position_rms"):
+    for name in ("position_mse.x", "attitude_mse.roll", "tilt_max", "command_rate", "late_position_rms"):
         assert own[name] == pytest.approx(by_wrench[name], rel=1e-9)
 
 
