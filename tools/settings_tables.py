@@ -33,7 +33,7 @@ from rotorfault.scenario.part import DEFAULT_PRESET, NO_PRESET, Part
 from rotorfault.scenario.scenario import Mismatch, Start, scenario_fields
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.studies.paper import range_tables, ranges
-from rotorfault.tuning.training import OBJECTIVES, WEIGHTS
+from rotorfault.tuning.objectives import OBJECTIVES, WEIGHTS
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)

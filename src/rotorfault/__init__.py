@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from rotorfault.scenario.library import load_scenario, scenario_names
     from rotorfault.scenario.neighbours import neighbour
     from rotorfault.scenario.scenario import Scenario
+    from rotorfault.tuning.search import Tuned, tune
 
 _HOME = {
     "Air": "plant.wind",
@@ -96,6 +97,7 @@ _HOME = {
     "Settings": "base.config",
     "State": "model.signals",
     "TimeInputs": "plant.timed",
+    "Tuned": "tuning.search",
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
     "ReferenceWarning": "base.errors",
@@ -119,6 +121,7 @@ _HOME = {
     "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
     "trim_report": "analysis.trim",
+    "tune": "tuning.search",
     "vehicle_names": "model.vehicle_file",
 }
 _UNDER_ANOTHER_NAME = {"Settings": "Strict"}
@@ -168,6 +171,7 @@ __all__ = [
     "Settings",
     "State",
     "TimeInputs",
+    "Tuned",
     "Vec3",
     "Vehicle",
     "VehicleWarning",
@@ -191,6 +195,7 @@ __all__ = [
     "scenario_names",
     "torque_reserve",
     "trim_report",
+    "tune",
     "vehicle_names",
 ]
 

@@ -15,9 +15,8 @@ from rotorfault.loop.recorded import LoopSignals
 SHORT = {"duration": 0.5}
 REQUIRED = {
     "outcome", "survived", "end_time", "settle_time", "position_mse", "attitude_mse", "cost", "tilt_max",
-    "command_rate",
-    "command_step", "excursion", "altitude_lost", "reference_step", "saturated_fraction", "detections", "false_alarms", "largest_riccati_residual",
-    "scenario", "controller", "seed", "version",
+    "command_rate", "command_step", "excursion", "altitude_lost", "reference_step", "saturated_fraction",
+    "detections", "false_alarms", "largest_riccati_residual", "scenario", "controller", "seed", "version",
 }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from places import DOCS, EXAMPLES
 from typer.testing import CliRunner
 
 import rotorfault as rf
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.study import study_from
 from rotorfault.cli.main import app
@@ -143,15 +144,15 @@ def test_trim_takes_the_example_controller() -> None:
 
 
 @pytest.mark.skipif(not have_simd(), reason="needs llvmlite")
-def test_tune_searches_what_the_example_names() -> None:
+def test_tune_searches_what_the_example_names(tmp_path: Path) -> None:
     pytest.importorskip("cma")
     from rotorfault.tuning import search
 
-    tuned = search.tune(place("controller"), generations=1, population=4, overrides={"duration": 3.0})
+    tuned = search.tune(place("controller"), generations=1, population=4, settings={"duration": 3.0})
     assert 1.0 <= tuned.settings["stiffness"] <= 20.0
     assert 1.0 <= tuned.settings["damping"] <= 10.0
-    table = tomllib.loads(search.as_toml(tuned, "tuned"))["controller"]
-    assert rf.load_scenario("hover-fault", {"controller": table})
+    preset = {"controller.kind": place("controller"), "controller.preset": str(tuned.save(tmp_path / "pd.toml"))}
+    assert rf.load_scenario("hover-fault", preset)[CONTROLLER].settings.stiffness == tuned.settings["stiffness"]
     with pytest.raises(InputError, match="does not say what to search"):
         search.tune(f"{EXAMPLES}/python_controller.py:PdWithIntegral")
 

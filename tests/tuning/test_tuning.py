@@ -22,7 +22,7 @@ from rotorfault.flight.fly import fly
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.scenario.part import part_from
-from rotorfault.tuning import search, training
+from rotorfault.tuning import objectives, search, training
 from rotorfault.tuning.space import SPACES, at_bounds, candidate, settings_at, space_of
 
 OWN = f"{EXAMPLES / 'controller.py'}:PdController"
@@ -91,20 +91,20 @@ def test_objectives_differ_by_what_they_say(monkeypatch: pytest.MonkeyPatch) -> 
     ours = one.model_copy(update={"controller": candidate(one, "smc", table)})
     J = fly(ours).summary()["cost"]
     worth = {
-        name: search._evaluate("smc", [table], groups, kind.worth)[0] for name, kind in training.OBJECTIVES.items()
+        name: search._evaluate("smc", [table], groups, kind.worth)[0] for name, kind in objectives.OBJECTIVES.items()
     }
     assert worth["cost"] == pytest.approx(np.log10(J), rel=1e-9)
     assert worth["balanced"] - worth["without-cost"] == pytest.approx(0.3 * np.log10(1.0 + J), rel=1e-9)
     gone = {"survived": False}
     known: Any = {"controller.virtual_position": None}
-    assert {kind.worth(ours, known, gone) for kind in training.OBJECTIVES.values()} == {training.LOST}
+    assert {kind.worth(ours, known, gone) for kind in objectives.OBJECTIVES.values()} == {objectives.LOST}
     with pytest.raises(InputError, match="objective 'cost' needs a controller that records virtual_position"):
-        training.cost_alone(ours, cast("Any", {}), {"survived": True, "cost": J})
+        objectives.cost_alone(ours, cast("Any", {}), {"survived": True, "cost": J})
 
 
 def test_unknown_objectives_and_boxes_are_refused() -> None:
     with pytest.raises(InputError, match="did you mean 'balanced'"):
-        search.tune("smc", 1, 4, objective="balancd")
+        search.tune("smc", objective="balancd")
     with pytest.raises(InputError, match=r"box 'huge'.*standard, wide"):
         space_of("smc", "huge")
     with pytest.raises(InputError, match="wider bounds into `search` of your class"):
@@ -171,23 +171,24 @@ def test_a_registered_controller_without_a_space_is_refused() -> None:
 
 
 @pytest.mark.parametrize("controller", ["smc", OWN])
-def test_what_a_search_gives_is_a_controller_again(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_search_gives_is_a_preset(controller: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """One generation on short flights, one of which ends before its fault: what is written is what was best."""
     pytest.importorskip("cma")
     short = (("paper-set-point", {"duration": 3.0}, 2), ("paper-set-point", {"duration": 1.0}, 1))
     monkeypatch.setattr(training, "GROUPS", short)
     told: list[tuple[int, float]] = []
-    tuned = search.tune(controller, 1, 4, seed=3, report=lambda done, best: told.append((done, best)))
+    tuned = search.tune(
+        controller, generations=1, population=4, seed=3, report=lambda done, best: told.append((done, best))
+    )
     assert told == [(1, pytest.approx(tuned.record["objective"], abs=1e-4))]
     assert tuned.record["flights_per_candidate"] == 3
     (best,) = search._evaluate(controller, [tuned.settings], training.training_groups(controller, {}))
     assert best == pytest.approx(told[0][1], rel=1e-9), "what was best is worth the same alone"
-    read = tomllib.loads(search.as_toml(tuned, "mine"))
+    read = tomllib.loads(tuned.as_toml("mine"))
+    assert read["mine"]["record"] == tuned.record
+    assert {key: value for key, value in read["mine"].items() if key != "record"} == tuned.settings
+    part = part_from(CONTROLLER, {"kind": controller, "preset": str(tuned.save(tmp_path / "p.toml"))}, allow=(OWN,))
     if controller == OWN:
-        assert read == {"controller": {"kind": OWN, **tuned.settings}}
-        assert part_from(CONTROLLER, read["controller"], allow=(OWN,)).settings.stiffness > 0.0
+        assert part.settings.stiffness == tuned.settings["stiffness"]
     else:
-        assert read["mine"]["record"] == tuned.record
-        part = part_from(CONTROLLER, {"kind": controller, "preset": "none", **tuned.settings})
-        assert {key: value for key, value in read["mine"].items() if key != "record"} == tuned.settings
         assert part.settings.cascade.tilt_max == tuned.settings["cascade"]["tilt_max"]

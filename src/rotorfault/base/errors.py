@@ -30,6 +30,24 @@ class MissingExtraError(InputError):
     """A library that an optional capability needs is not installed."""
 
 
+def missing_extra(what: str, extra: str) -> MissingExtraError:
+    """The error for a library that is not there, with the command that brings it.
+
+    Parameters
+    ----------
+    what : str
+        What needs which library.
+    extra : str
+        Of the package's optional dependencies.
+    """
+    return MissingExtraError(f"{what}, which is not installed; {how_to_install(extra)}")
+
+
+def how_to_install(extra: str) -> str:
+    """What brings an extra: rotorfault comes as a checkout, and is in no package index."""
+    return f"in the folder of rotorfault: .venv/bin/python -m pip install -e '.[{extra}]'"
+
+
 class ReferenceWarning(UserWarning):
     """A reference can be flown, but is hardly meant."""
 

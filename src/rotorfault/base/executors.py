@@ -13,7 +13,7 @@ from typing import Any, final
 
 from rotorfault.base import interrupts
 from rotorfault.base.bounds import thread_count
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, missing_extra
 from rotorfault.base.resumable import Executor, InputT, KeyT, ResultT, Task
 
 
@@ -119,7 +119,7 @@ def executor_of(threads: int | None, scheduler: str | None) -> Executor:
     if scheduler is None:
         return InProcess(count or os.cpu_count())
     if importlib.util.find_spec("distributed") is None:
-        raise InputError("--scheduler needs Dask, which is not installed; install rotorfault[cluster]")
+        raise missing_extra("--scheduler needs Dask", "cluster")
     from rotorfault.base.dask_executor import Dask  # loads Dask, which takes longer than most campaigns
 
     return Dask(scheduler)

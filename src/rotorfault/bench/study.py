@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rotorfault._version import __version__
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, how_to_install, missing_extra
 from rotorfault.base.files import write_atomically
 from rotorfault.base.progress import Say
 from rotorfault.base.text_table import table_lines
@@ -119,7 +119,7 @@ def text(results: dict[str, Any]) -> str:
     if results["accuracy"] is not None:
         parts.append(_accuracy(results["accuracy"]))
     else:
-        parts.append("error against cost: not measured, for heyoka is not installed (rotorfault[bench])")
+        parts.append(f"error against cost: not measured, for heyoka is not installed; {how_to_install('bench')}")
     if results["peers"]:
         parts.append(_peers(results))
     return "\n\n".join(parts)
@@ -212,7 +212,7 @@ def draw(results: dict[str, Any], path: Path) -> None:
         If the errors were not measured.
     """
     if results["accuracy"] is None:
-        raise InputError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
+        raise missing_extra("--figure needs heyoka, which gives the truth", "bench")
     peers_there = {name: peer for name, peer in results["peers"].items() if "error" not in peer}
     # matplotlib takes a second to load, which the measurements need not spend.
     from rotorfault.bench import accuracy_figure

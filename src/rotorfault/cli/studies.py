@@ -1,4 +1,4 @@
-"""The commands of studies and measurements: `paper`, `ranges`, `tune` and `bench`."""
+"""The commands of studies and measurements: `paper`, `ranges` and `bench`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorfault.base.errors import InputError, MissingExtraError
+from rotorfault.base.errors import InputError, missing_extra
 from rotorfault.cli.app import app, say, stopped
 
 
@@ -96,59 +96,7 @@ def ranges(
 
 def _needs_cma() -> None:
     if importlib.util.find_spec("cma") is None:
-        raise MissingExtraError("tuning needs the package cma, which is not installed; install rotorfault[tune]")
-
-
-@app.command()
-def tune(
-    controller: Annotated[
-        str, typer.Argument(help="roismc, smc, ismc, sdre, or FILE.py:NAME for a class of your own with `search`.")
-    ],
-    generations: Annotated[int, typer.Option(min=1, help="Generations of the search.")] = 100,
-    population: Annotated[int, typer.Option(min=4, help="Candidates per generation.")] = 24,
-    seed: Annotated[int, typer.Option(min=1, help="Seed of the optimiser.")] = 1,
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Override a key of all training flights; may be repeated."),
-    ] = None,
-    objective: Annotated[
-        str, typer.Option(help="What the search is for: balanced (the shipped presets), cost or without-cost.")
-    ] = "balanced",
-    box: Annotated[str, typer.Option(help="Bounds of the search: standard, or wide.")] = "standard",
-    name: Annotated[str, typer.Option(help="Name of the preset to write.")] = "tuned",
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="TOML file to write; printed if not given.")
-    ] = None,
-) -> None:
-    """Search a controller's gains by CMA-ES on training flights; same budget and objective for all.
-
-    Needs the extra 'tune'. Ctrl-C ends the search, gives the best so far, and exits with 130.
-
-    Example: rotorfault tune smc --generations 100 --out smc.toml
-    """
-    _needs_cma()
-    from rotorfault.base.files import output_folder, write_atomically
-    from rotorfault.base.progress import Bar
-    from rotorfault.scenario.overrides import parse_overrides
-    from rotorfault.tuning import search
-
-    settings = parse_overrides(assignments or [])
-    search.require_name(name)
-    if out is not None:
-        output_folder(out.parent)
-    with Bar(f"tuning {controller}", generations, "generations") as bar:
-        tuned = search.tune(
-            controller, generations, population, seed, settings, lambda done, _: bar.update(done), objective, box
-        )
-    text = search.as_toml(tuned, name)
-    if out is None:
-        say(text)
-    else:
-        write_atomically(out, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-        say(f"wrote {out}, objective {tuned.record['objective']:g}")
-    if (done := tuned.record["generations"]) < generations:
-        place = "above" if out is None else f"in {out}"
-        raise stopped(f"interrupted after {done} of {generations} generations; the best until then is {place}")
+        raise missing_extra("tuning needs the package cma", "tune")
 
 
 @app.command()
@@ -182,7 +130,7 @@ def bench(
         if figure.suffix not in (".png", ".svg", ".pdf"):
             raise InputError(f"--figure {figure}: allowed: a file that ends in .png, .svg or .pdf")
         if importlib.util.find_spec("heyoka") is None:
-            raise MissingExtraError("--figure needs heyoka, which gives the truth; install rotorfault[bench]")
+            raise missing_extra("--figure needs heyoka, which gives the truth", "bench")
     # Before NumPy is loaded: with problems this small the threads of BLAS only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from rotorfault.bench import study

@@ -18,7 +18,7 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any, cast, final
 
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, missing_extra
 from rotorfault.engine import python
 from rotorfault.engine.batch import Batch, Recording, Watch, no_watch
 from rotorfault.maths.geometry import PerRotor, zeros
@@ -126,8 +126,6 @@ def _heyoka() -> ModuleType:
         # The package is not there on every system.
         import heyoka
     except ImportError:
-        raise InputError(
-            "Taylor series need heyoka, not installed; pip install 'rotorfault[bench]' "
-            "(it exists for Linux on x86-64 and aarch64 only)"
-        ) from None
+        what = "Taylor series need heyoka (for Linux on x86-64 and aarch64 only)"
+        raise missing_extra(what, "bench") from None
     return heyoka  # type: ignore[no-any-return]

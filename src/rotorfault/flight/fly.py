@@ -227,7 +227,7 @@ def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
     vehicle, controller = scenario.vehicle.vehicle, scenario[CONTROLLER]
     name = controller.kind.rpartition(":")[2] if own is None else type(own).__name__
     parts = [
-        {"slot": slot.name, "kind": part.kind, "preset": part.preset, "source": part.source}
+        {"slot": slot.name, "kind": part.kind, "preset": part.preset_label, "source": part.source}
         for slot, part in scenario.parts()
         if own is None or slot is not CONTROLLER
     ]
@@ -240,7 +240,7 @@ def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
         "title": f"{scenario.name} flown by {name}",
         "scenario": scenario.name,
         "controller": name,
-        "preset": controller.preset if own is None else "",
+        "preset": controller.preset_label if own is None else "",
         "own_controller": name if own is not None else "",
         "parts": json.dumps(parts),
         "plant": scenario[PLANT].kind,

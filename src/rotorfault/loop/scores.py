@@ -33,6 +33,9 @@ AT_LIMIT = 1e-9  # of the largest command: below it a difference from a limit is
 # m on each axis: about the size of the vehicles, and half of what a campaign grades as held, so that a flight that
 # has recovered is not on the verge of being degraded.
 RECOVERED = 0.25
+# Change of commands in a sampling period, as a share of hover thrust, from which on they rattle: our choice. It heats
+# motors, and speed controllers, which lag by milliseconds, follow little of it.
+RATTLING = 0.02
 READ_AFTER = 0.15  # s after an onset at which losses are read: six time constants of the believed loss
 COST_INPUT = "controller.virtual_position"
 

@@ -12,6 +12,7 @@ from rotorfault.base.config import parse_toml, read_text
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.foreign import is_place
 from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.preset_file import beside
 from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
 from rotorfault.scenario.slots import SLOTS
 
@@ -71,6 +72,8 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
         for table in part if isinstance(part, list) else [part]:
             if isinstance(table, dict) and is_file(table.get("kind")):
                 table["kind"] = str(folder / table["kind"])
+            if isinstance(table, dict) and "preset" in table:
+                table["preset"] = beside(folder, table["preset"])
         if is_file(part):
             tables[slot.name] = str(folder / str(part))
 

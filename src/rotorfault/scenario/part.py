@@ -14,6 +14,7 @@ from rotorfault.base.config import Strict, in_words, passed_on, refusal
 from rotorfault.base.errors import InputError, as_text, choices, short, unknown
 from rotorfault.base.registry import Kind
 from rotorfault.model.slot import Slot
+from rotorfault.scenario.preset_file import is_preset_file, label_of, preset_from_file
 
 B = TypeVar("B")
 DEFAULT_PRESET = "tuned"
@@ -32,7 +33,7 @@ class Part(Generic[B]):
     settings : Strict
         Checked.
     preset : str
-        Name of the preset that its settings started from; empty where there are no presets.
+        Preset that its settings started from, by name or file; empty where there are none.
     factory : Kind, optional
         Makes the part, where `kind` is a place in code.
     """
@@ -45,7 +46,7 @@ class Part(Generic[B]):
         self._factory = factory
 
     def __repr__(self) -> str:
-        preset = f", preset {self.preset}" if self.preset else ""
+        preset = f", preset {self.preset_label}" if self.preset else ""
         return f"<{self.slot.registry.sort} {self.kind}{preset}>"
 
     def __eq__(self, other: object) -> bool:
@@ -53,6 +54,11 @@ class Part(Generic[B]):
 
     def __hash__(self) -> int:
         return hash((self.slot.name, self.kind))
+
+    @property
+    def preset_label(self) -> str:
+        """What its preset is called: of one from a file, the name without the folder."""
+        return label_of(self.preset)
 
     @property
     def factory(self) -> Kind[B]:
@@ -194,8 +200,9 @@ def _beside_preset(slot: Slot[Any], table: Mapping[str, Any]) -> dict[str, Any]:
     if preset is None or slot.presets is None or kind not in slot.registry:
         return own
     try:
-        settings = slot.registry[kind].Settings.model_validate(slot.presets(kind).get(preset, {}))
-    except ValidationError:
+        given = preset_from_file(slot, kind, preset) if is_preset_file(preset) else slot.presets(kind).get(preset, {})
+        settings = slot.registry[kind].Settings.model_validate(given)
+    except (ValidationError, InputError):
         return own  # of one that gives not all that is needed no table is full by itself
     before = settings.model_dump(mode="json")
     return _unlike(own, before) if set(own) >= set(before) else own
@@ -248,7 +255,7 @@ def _with_preset(
     """Name of the preset, and the settings with it put under them."""
     known = {} if slot.presets is None else slot.presets(kind)
     if preset is not None and not isinstance(preset, str):
-        raise refusal("preset", f"got {short(preset)}; allowed: the name of a preset")
+        raise refusal("preset", f"got {short(preset)}; allowed: the name of a preset, or a TOML file of one")
     if preset is None:
         preset = DEFAULT_PRESET if DEFAULT_PRESET in known else NO_PRESET if known else ""
     if preset in known:
@@ -256,8 +263,14 @@ def _with_preset(
     # A table that holds every setting needs no preset to be looked up: its name says where they come from.
     fields = set(factory.Settings.model_fields)
     complete = bool(fields) and set(settings) >= fields
+    if is_preset_file(preset) and not complete:
+        try:
+            return preset, _merged(preset_from_file(slot, kind, preset), settings)
+        except InputError as error:
+            raise refusal("preset", str(error)) from None
     if preset not in ("", NO_PRESET) and not complete:
-        raise refusal("preset", unknown("preset", preset, [*known, NO_PRESET]))
+        allowed = [*known, *([NO_PRESET] if known else []), "FILE.toml"]
+        raise refusal("preset", unknown("preset", preset, allowed))
     return preset, settings
 
 

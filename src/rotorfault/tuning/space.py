@@ -197,7 +197,9 @@ def candidate(scenario: Scenario, controller: str, tables: dict[str, Any]) -> Pa
         Of the controller, as `settings_at` or a preset have them.
     """
     if controller not in SPACES:
-        return part_from(CONTROLLER, {"kind": controller, **tables}, allow=(controller,))
+        known = scenario[CONTROLLER]
+        below = known.as_table() if known.kind == controller else {"kind": controller}
+        return part_from(CONTROLLER, _merged(below, tables), allow=(controller,))
     own = scenario.as_tables()
     override_all(own, {"controller.kind": controller, "controller.preset": "none"})
     return part_from(CONTROLLER, _merged(own[CONTROLLER.name], tables))

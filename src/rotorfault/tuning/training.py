@@ -1,88 +1,34 @@
-"""The flights that gains are searched on, and what a flight is worth.
+"""The flights that gains are searched on.
 
-Training flights are neighbours of the paper's cases, never the cases themselves: true mass, inertia, drag, rotor lag
-and initial state differ by up to 10 % (25 % for the lag), unknown to the autopilot, and the faults set in at another
-time. Case 1 is trained on both plants; case 3 with shorter periods, to see more switches in less time.
-
-Objective of a flight, the smaller the better, in seconds or what is taken for one:
-
-- set point: time to settle within 2 % of the step (`INTERRUPTED` of the onset plus the time from then on, where the
-  fault interrupts), plus `EXCURSION_FREE` and `LEFT_WEIGHT` for what the fault does to the error;
-- moving reference: root mean square position error, weighted by `TRACKING_WEIGHT`;
-- plus `COST_WEIGHT` log10(1 + J) with the paper's cost J, 1 for every false alarm or missed rotor, the tilt beyond
-  `TILT_FREE`, and `EFFORT_WEIGHT` log10(1 + mean square of the demanded angular acceleration);
-- `LOST` for a flight that is lost.
-
-The weights are our choice; nobody prescribes them. The `tuned` presets were found with them, so that they must not
-change without a new search for every controller. Beside each stands what it trades.
-
-`OBJECTIVES` names what a search may be for. What the ratio of two laws owes to that choice is shown by
-`rotorfault.studies.paper.ranges`.
+Where nothing else is given they are neighbours of the paper's cases, never the cases themselves: true mass, inertia,
+drag, rotor lag and initial state differ by up to 10 % (25 % for the lag), unknown to the autopilot, and the faults
+set in at another time. Case 1 is trained on both plants; case 3 with shorter periods, to see more switches in less
+time. Of scenarios of a user's own neighbours are taken in the same way, each with noise of its own.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rotorfault.base.errors import InputError, unknown
-from rotorfault.loop.scores import SETTLED
-from rotorfault.maths.arrays import Array
+from rotorfault.flight.fly import prepare
 from rotorfault.plant import FAULT
-from rotorfault.results.flight_data import FlightData
-from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
+from rotorfault.tuning.objectives import onset_of
 from rotorfault.tuning.space import SPACES
 
-# Five times what a tuned set-point flight comes to: survival comes before speed, yet one lost neighbour among many
-# does not hide what the others are worth.
-LOST = 10.0
-# Of the time of the fault, for a flight that had not settled by then: more would ask for settling before the fault at
-# any price, less would reward those that wait for it.
-INTERRUPTED = 0.6
-# Of the settling band, up to which an excursion after the fault costs nothing: a search has no reason to make it
-# smaller, and keeps the rest of the band in reserve.
-EXCURSION_FREE = 0.7
-# Per band of error at the end: leads the search on among flights that do not settle, which are all alike otherwise.
-LEFT_WEIGHT = 0.3
-# Per metre: a centimetre behind the sinusoid, which all laws follow closely, counts as a tenth of a second; half a
-# metre behind the square wave, which nobody can follow through its jumps, as one second.
-TRACKING_WEIGHT = {"paper-sinusoid": 10.0, "paper-square": 2.0}
-# Per decade of J: speed that costs ten times as much must save 0.3 s. A quarter of what a tuned flight comes to.
-COST_WEIGHT = 0.3
-TILT_FREE = 1.1  # rad; the largest demand that a search may allow, see `cascade.tilt_max` in the search space
-# Per decade of (rad/s^2)^2: settles between flights that are alike in all else, in favour of the quieter one.
-EFFORT_WEIGHT = 0.04
-# What pages say of them: value, unit, reason. The comments above say the same in more words.
-WEIGHTS: tuple[tuple[str, float, str, str], ...] = (
-    ("a lost flight", LOST, "s", "five times a tuned set-point flight: survival first, yet one of many hides none"),
-    ("time of a fault that interrupts the approach", INTERRUPTED, "1",
-     "1 would ask for settling before the fault at any price, 0 would reward who waits for it"),
-    ("excursion after the fault that is free", EXCURSION_FREE, "bands",
-     "no reason to make it smaller still; the rest of the band is a reserve"),
-    ("error left at the end", LEFT_WEIGHT, "s per band", "leads on among flights that do not settle, else all alike"),
-    ("tracking error, sinusoid", TRACKING_WEIGHT["paper-sinusoid"], "s/m",
-     "all laws follow closely: a centimetre counts as a tenth of a second"),
-    ("tracking error, square wave", TRACKING_WEIGHT["paper-square"], "s/m",
-     "nobody follows the jumps: half a metre counts as one second"),
-    ("cost, on log10(1 + J)", COST_WEIGHT, "s per decade",
-     "ten times the cost must save 0.3 s; a quarter of what a tuned flight comes to"),
-    ("rotor flagged wrongly, or missed", 1.0, "s", "as bad as settling a second later"),
-    ("tilt beyond 1.1 rad", 1.0, "s/rad", "the largest tilt that may be demanded: more is a flight near its limit"),
-    ("effort, on log10(1 + mean square angular acceleration)", EFFORT_WEIGHT, "s per decade",
-     "settles between flights alike in all else, for the quieter one"),
-)  # fmt: skip
-# Signals that objectives read, as far as a controller has them.
-NEEDED = (
-    "position", "position_reference", "fault_flag", "torque_demand", "controller.virtual_attitude",
-    "controller.virtual_position",
-)  # fmt: skip
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
-_FAULTY = np.array([1.0, 0.0, 1.0, 0.0])
+RECORD = 0.01  # s between two records: what objectives read changes no faster
+LAG = (0.75, 1.25)  # factors of the rotors' bandwidth: a filter over the commands knows it no better
+NEIGHBOURS = 7  # of a scenario of a user's own
+# Of the time of its first fault: a search must not count on the fault at the one instant.
+ONSET = (0.5, 1.5)
+LATEST = 0.8  # of the flight: the rest shows what becomes of it
 
 # Scenario, overrides, number of neighbours; one batch each.
 GROUPS: tuple[tuple[str, dict[str, Any], int], ...] = (
@@ -94,138 +40,66 @@ GROUPS: tuple[tuple[str, dict[str, Any], int], ...] = (
 
 
 def training_groups(
-    controller: str, overrides: dict[str, Any], neighbours: int | None = None
+    controller: str,
+    overrides: Mapping[str, Any],
+    neighbours: int | None = None,
+    scenarios: Sequence[str | Path | Mapping[str, Any] | Scenario] = (),
+    *,
+    allow_code: bool = False,
 ) -> list[list[Scenario]]:
     """Training flights in groups that fly in one batch each.
 
     Parameters
     ----------
     controller : str
-    overrides : dict
+    overrides : mapping
         Dotted keys and values for all flights, such as another vehicle.
     neighbours : int, optional
-        At most so many in each group; as many as the presets were found with if not given.
+        At most so many in each group of the paper's, as many as the presets were found with if not given; so many of
+        each scenario of a user's own, 7 if not given.
+    scenarios : sequence of str, Path, mapping or Scenario
+        What is flown in place of the paper's cases.
+    allow_code : bool
+        Whether code that these scenarios name may run; code that `controller` and `overrides` name may.
+
+    Raises
+    ------
+    InputError
+        If a scenario cannot be flown so.
     """
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([FIRST_SEED])))
+    plain: dict[str, Any] = {"controller.preset": "none"} if controller in SPACES else {}
+
+    def base(scenario: Any, own: Mapping[str, Any]) -> Scenario:
+        return prepare(scenario, controller, {**plain, **own, **overrides}, allow_code=allow_code)
+
+    def lagging(one: Scenario) -> Scenario:
+        mismatch = one.mismatch.model_copy(update={"rotor_bandwidth": float(draw.uniform(*LAG))})
+        return one.model_copy(update={"mismatch": mismatch})
+
+    if scenarios:
+        count = NEIGHBOURS if neighbours is None else neighbours
+        return [
+            [lagging(_neighbour(_recorded(base(one, {})), FIRST_SEED + i)) for i in range(count)] for one in scenarios
+        ]
     groups = []
-    for name, own, count in GROUPS:
-        plain = {"controller.preset": "none"} if controller in SPACES else {}
-        settings = {"controller.kind": controller, **plain, "record_period": 0.01, **own, **overrides}
-        base = load_scenario(name, settings)
-        if not all("time" in type(part.settings).model_fields for part in base.all(FAULT)) or not base.all(FAULT):
-            raise InputError(
-                "fault: gains are searched on flights with faults that set in at a time; leave those of the training "
-                "flights, or give others with 'time'"
-            )
-        group = []
-        for i in range(count if neighbours is None else min(count, neighbours)):
-            one = neighbour(base, seed=FIRST_SEED + i)
-            lag = float(draw.uniform(0.75, 1.25))
-            group.append(
-                one.model_copy(update={"mismatch": one.mismatch.model_copy(update={"rotor_bandwidth": lag})})
-            )
-        groups.append(group)
+    for name, own, most in GROUPS:
+        one = base(name, {"record_period": RECORD, **own})
+        count = most if neighbours is None else min(most, neighbours)
+        groups.append([lagging(neighbour(one, seed=FIRST_SEED + i)) for i in range(count)])
     return groups
 
 
-class Objective(NamedTuple):
-    """What a search is for."""
-
-    says: str  # in a line, for people
-    worth: Callable[[Scenario, FlightData, Mapping[str, Any]], float]  # of a flight, smaller is better
-
-
-def balanced(
-    scenario: Scenario, data: FlightData, scores: Mapping[str, Any], cost_weight: float = COST_WEIGHT
-) -> float:
-    """What one flight is worth.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        That was flown.
-    data : FlightData
-        Its records.
-    scores : mapping
-        Its row of a score table.
-    cost_weight : float
-        Of log10(1 + J).
-    """
-    if not scores["survived"]:
-        return LOST
-    times, flags = data["time"].values, data["fault_flag"].values
-    onset = float(scenario.all(FAULT)[0].settings.time)
-    k = int(np.searchsorted(times, onset - 1e-9))
-    tracking = TRACKING_WEIGHT.get(scenario.name)
-    error = data["position"].values - data["position_reference"].values
-    worth = _settling(error, times, onset, k) if tracking is None else tracking * float(np.sqrt(np.mean(error**2)))
-    wrong = np.abs(flags[-1] - _FAULTY).sum() + flags[:k].max(axis=0, initial=0.0).sum()
-    wrong += flags[k:, [1, 3]].max(axis=0, initial=0.0).sum()
-    # What the cascade asks of the attitude; other controllers ask for a torque.
-    known = "controller.virtual_attitude" in data
-    virtual = data["controller.virtual_attitude" if known else "torque_demand"].values
-    virtual = virtual if known else virtual / np.array([*scenario.vehicle.vehicle.inertia])
-    return float(
-        worth
-        + float(wrong)
-        + (cost_weight * math.log10(1.0 + scores["cost"]) if "controller.virtual_position" in data else 0.0)
-        + max(0.0, float(scores["tilt_max"]) - TILT_FREE)
-        + EFFORT_WEIGHT * math.log10(1.0 + float(np.mean(virtual**2)))
-    )
+def _recorded(scenario: Scenario) -> Scenario:
+    """The same scenario with records as far apart as a search needs."""
+    every = max(1, math.floor(RECORD / scenario.period + 1e-9))
+    return scenario.model_copy(update={"record_period": every * scenario.period})
 
 
-def without_cost(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
-    """`balanced` with no weight on the cost J."""
-    return balanced(scenario, data, scores, cost_weight=0.0)
-
-
-def cost_alone(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
-    """log10 J: a search for the cost alone, in which a case of small J counts as much as one of large J.
-
-    Raises
-    ------
-    InputError
-        If the controller has no cost.
-    """
-    if "controller.virtual_position" not in data:
-        raise InputError(
-            "objective 'cost' needs a controller that records virtual_position, of which the cost J is made; "
-            "allowed for this one: balanced, without-cost"
-        )
-    # The floor keeps the logarithm of a flight without error and input a number.
-    return math.log10(max(float(scores["cost"]), 1e-6)) if scores["survived"] else LOST
-
-
-OBJECTIVES: dict[str, Objective] = {
-    "balanced": Objective(
-        "time to settle and tracking error, with the cost J a quarter: the shipped presets", balanced
-    ),
-    "cost": Objective("the cost J alone", cost_alone),
-    "without-cost": Objective("as balanced, with no weight on J", without_cost),
-}
-
-
-def objective_of(name: str) -> Objective:
-    """An objective by its name.
-
-    Raises
-    ------
-    InputError
-        If there is none of this name.
-    """
-    if name not in OBJECTIVES:
-        raise InputError(unknown("objective", name, list(OBJECTIVES)))
-    return OBJECTIVES[name]
-
-
-def _settling(error: Array, times: Array, onset: float, k: int) -> float:
-    """Worth in s of an error after a step; record k is the first with the fault."""
-    excess = np.max(np.abs(error) / (SETTLED * np.abs(error[0])), axis=1)
-    every = float(times[1] - times[0])
-    before, after = np.flatnonzero(excess[:k] > 1.0), np.flatnonzero(excess[k:] > 1.0)
-    first = (before[-1] + 1) * every if len(before) else 0.0
-    late = (after[-1] + 1) * every if len(after) else 0.0
-    left = LEFT_WEIGHT * float(excess[-1])
-    if first < onset - every:
-        return float(first + late + max(0.0, float(excess[k:].max(initial=0.0)) - EXCURSION_FREE) + left)
-    return float(INTERRUPTED * onset + late + left)
+def _neighbour(scenario: Scenario, seed: int) -> Scenario:
+    """A neighbour of a scenario of a user's own, with its own noise, and its fault at another time."""
+    times = [part.settings.time for part in scenario.all(FAULT) if "time" in type(part.settings).model_fields]
+    early, late = (share * min(times, default=onset_of(scenario)) for share in ONSET)
+    late = min(late, LATEST * scenario.duration)
+    moved = (min(early, late), late) if math.isfinite(late) and times else (0.0, 0.0)
+    return neighbour(scenario, seed, onset=moved).model_copy(update={"seed": seed})

@@ -82,7 +82,7 @@ def test_both_laws_get_the_same_budget_and_go_on_where_they_were(
     pytest.importorskip("cma")
     monkeypatch.setattr(training, "GROUPS", SHORT)
     monkeypatch.setattr(ranges, "GROUPS", SHORT)
-    monkeypatch.setattr(ranges, "OBJECTIVES", {"cost": training.OBJECTIVES["cost"]})
+    monkeypatch.setattr(ranges, "SEARCHED_FOR", ("cost",))
     monkeypatch.setattr(ranges, "BOXES", ("standard",))
     monkeypatch.setattr(ranges, "flown", lambda found, only=(): found)
     searched: list[str] = []

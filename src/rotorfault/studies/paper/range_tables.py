@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 from rotorfault.base.text_table import table_lines
 from rotorfault.studies.paper.cases import CASES
-from rotorfault.studies.paper.ranges import FULL, LAWS, Cell, Flown, Gains, cells
+from rotorfault.studies.paper.ranges import FULL, LAWS, SEARCHED_FOR, Cell, Flown, Gains, cells
 from rotorfault.studies.paper.verdicts import MARGIN, below
 from rotorfault.tuning.space import BOXES
-from rotorfault.tuning.training import OBJECTIVES
 
 
 class Pair(NamedTuple):
@@ -65,9 +64,9 @@ def span(values: Iterable[float | None], digits: int = 2) -> str:
 
 def ratio_rows(found: Sequence[Pair]) -> list[tuple[str, ...]]:
     """Cost of ROISMC over that of SMC: a header, then the cases; a column for each objective and one for all."""
-    rows: list[tuple[str, ...]] = [("case", "paper", *OBJECTIVES, "all")]
+    rows: list[tuple[str, ...]] = [("case", "paper", *SEARCHED_FOR, "all")]
     for case in CASES.values():
-        each = [[pair for pair in found if pair.cell.objective == name] for name in OBJECTIVES]
+        each = [[pair for pair in found if pair.cell.objective == name] for name in SEARCHED_FOR]
         spans = [span(pair.ratio(case.id, cost) for pair in some) for some in (*each, found)]
         paper = case.paper_cost["roismc"] / case.paper_cost["smc"]
         rows.append((case.title.lower(), f"{paper:.2f}", *spans))
@@ -79,7 +78,7 @@ def number_rows(found: Sequence[Pair]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [
         ("searched for", "case", "J of ROISMC", "J of SMC", "lower J", "settles earlier", "lower MSE")
     ]
-    for name in OBJECTIVES:
+    for name in SEARCHED_FOR:
         some = [pair for pair in found if pair.cell.objective == name]
         for case in CASES.values():
             both = ([pair.ours for pair in some], [pair.theirs for pair in some])
@@ -98,7 +97,7 @@ def _won(found: Sequence[Pair], case: str, number: Callable[[Flown], float | Non
 def search_rows(gains: Sequence[Gains]) -> list[tuple[str, ...]]:
     """What searches came to: a header, then a row per objective and box; and which values lie at a bound."""
     rows: list[tuple[str, ...]] = [("searched for", "box", "ROISMC", "SMC", "at a bound")]
-    for name in OBJECTIVES:
+    for name in SEARCHED_FOR:
         for box in BOXES:
             some = [one for one in gains if (one.cell.objective, one.cell.box) == (name, box)]
             spans = [span(one.objective for one in some if one.law == law) for law in LAWS]
