@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rotorfault.autopilot.instant import Decision
     from rotorfault.autopilot.response.protocol import Response, ResponseInputs
     from rotorfault.base.config import Strict as Settings
-    from rotorfault.base.errors import InputError, ReferenceWarning, VehicleWarning
+    from rotorfault.base.errors import ControllerWarning, FaultWarning, InputError, ReferenceWarning, VehicleWarning
     from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.flight.check_block import BlockReport, check_block
     from rotorfault.flight.flight import Flight, load
@@ -64,6 +64,7 @@ _HOME = {
     "Context": "model.block",
     "ControlInputs": "autopilot.control.protocol",
     "ControlOutput": "autopilot.control.protocol",
+    "ControllerWarning": "base.errors",
     "Controller": "autopilot.control.protocol",
     "Decision": "autopilot.instant",
     "Diagnoser": "autopilot.diagnosis.protocol",
@@ -74,6 +75,7 @@ _HOME = {
     "Estimator": "autopilot.estimation.protocol",
     "EstimatorInputs": "autopilot.estimation.protocol",
     "Fault": "plant.faults",
+    "FaultWarning": "base.errors",
     "Flight": "flight.flight",
     "Flights": "flight.many",
     "Ground": "plant.ground",
@@ -138,6 +140,7 @@ __all__ = [
     "ControlInputs",
     "ControlOutput",
     "Controller",
+    "ControllerWarning",
     "Decision",
     "Diagnoser",
     "Diagnosis",
@@ -147,6 +150,7 @@ __all__ = [
     "Estimator",
     "EstimatorInputs",
     "Fault",
+    "FaultWarning",
     "Flight",
     "Flights",
     "Ground",

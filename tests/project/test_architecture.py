@@ -15,7 +15,7 @@ FILES = sorted(SOURCE.rglob("*.py"))
 BELIEF = ("autopilot",)
 # Imports that may wait inside a function until they are needed, by module, and why.
 # A command of the command line loads what it runs when it is called, so that `--help` and `list` cost nothing.
-COMMANDS = tuple(f"rotorfault.cli.{name}" for name in ("campaign", "export", "fly", "look", "studies"))
+COMMANDS = tuple(f"rotorfault.cli.{name}" for name in ("campaign", "export", "fly", "look", "studies", "tune"))
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"
 OPTIONAL = "need not be installed"
@@ -44,8 +44,8 @@ LAZY = {
     "rotorfault.flight.flight": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
-    "rotorfault.studies.paper.ranges": {"rotorfault.tuning.search": "cma need not be installed"},
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
+    "rotorfault.tuning.search": {"cma": OPTIONAL},
 }
 # Modules that load others by names that are data: only there may `import_module` stand, which hides from readers,
 # from mypy and from these tests what is imported.

@@ -52,6 +52,14 @@ class ReferenceWarning(UserWarning):
     """A reference can be flown, but is hardly meant."""
 
 
+class FaultWarning(UserWarning):
+    """Faults that come after the flight, or that no controller can survive."""
+
+
+class ControllerWarning(UserWarning):
+    """A controller's gains are too fast for rotors or sampling, are for other rotors, or make commands rattle."""
+
+
 class VehicleWarning(UserWarning):
     """A vehicle's numbers are possible, but hardly meant, or hardly fit to fly."""
 

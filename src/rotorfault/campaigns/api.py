@@ -19,8 +19,8 @@ from rotorfault.campaigns.replay import differences, replay
 from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, changed, load_study, sources_of, study_from
+from rotorfault.flight import doubts
 from rotorfault.flight.flight import Flight
-from rotorfault.scenario.vehicle_lines import warn_of_vehicle
 
 Say = Callable[[str], None]
 
@@ -173,7 +173,7 @@ def campaign(
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)
     for scenario in checked.scenarios:
-        warn_of_vehicle(scenario)
+        doubts.warn(scenario, varied=True)
     executor = executor_of(workers, scheduler)
     with run.open_store(checked, folder, resume, repair) as store:
         for damage in store.repaired:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rotorfault.base.angles import TURN, in_radians
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.plant.sensors import Noisy
+from rotorfault.scenario.preset_file import is_preset_file
 
 Columns = dict[str, NDArray[Any]]
 
@@ -133,6 +134,8 @@ def out_of_range(name: str, values: Iterable[Any]) -> str | None:
     """
     (low, high), unit = axis(name).range, axis(name).unit
     for value in values:
+        if name.endswith("preset") and is_preset_file(value):
+            return f"{name} = '{value}': preset files cannot be varied; give each to a variant of its own"
         if not isinstance(value, str) and not low <= value <= high:
             came = in_radians(value) if unit == "rad" else f"{value:g}"
             return f"{name} = {came}; allowed: {low:g} to {high:g}"

@@ -63,7 +63,6 @@ def fly(
     # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
     folder = out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")
     output_folder(folder)
-    _warn(checked)
     finish(_flown(checked, engine), folder, figures)
 
 
@@ -72,24 +71,6 @@ def _name(scenario: Scenario) -> str:
     from rotorfault.autopilot.control import CONTROLLER
 
     return scenario[CONTROLLER].kind.rpartition(":")[2]
-
-
-def _warn(scenario: Scenario) -> None:
-    """Say what is likely not meant, before it is flown."""
-    from rotorfault.analysis.sampling_check import sampled_data_warnings
-    from rotorfault.flight.reference_rows import unflown
-    from rotorfault.model.block import Context
-    from rotorfault.plant import FAULT
-
-    for warning in [*sampled_data_warnings(scenario), *unflown(scenario)]:
-        say(f"warning: {warning}", err=True)
-    vehicle = scenario.mismatch.applied(scenario.vehicle)
-    for number, part in enumerate(scenario.all(FAULT)):
-        fault = part.make()
-        onset = fault.onset(fault.parameters(Context(vehicle, scenario.period)))
-        if onset >= scenario.duration:
-            text = f"sets in at {onset:g} s, after the end of the flight at {scenario.duration:g} s"
-            say(f"warning: fault {number + 1} (key fault.{number}) {text}", err=True)
 
 
 def _flown(scenario: Scenario, engine: str | None) -> Flight:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from rotorfault.base.progress import Bar
 from rotorfault.base.versions import versions
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch, Recording
+from rotorfault.flight import doubts
 from rotorfault.flight.assembly import Own, assemble, assemble_all
 from rotorfault.flight.flight import Flight
 from rotorfault.loop.scores import ENDS
@@ -34,7 +36,6 @@ from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import NO_PRESET
 from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
 from rotorfault.scenario.slots import SLOTS
-from rotorfault.scenario.vehicle_lines import warn_of_vehicle
 
 
 def fly(
@@ -48,7 +49,9 @@ def fly(
 ) -> Flight:
     """Fly a scenario.
 
-    Warns (`rotorfault.VehicleWarning`) of a vehicle whose numbers are hardly meant.
+    Warns of what is hardly meant: a vehicle's numbers (`VehicleWarning`), faults outside the attainable set
+    (`FaultWarning`), a preset made for other rotors or commands that rattle (`ControllerWarning`), a reference that
+    is not flown whole (`ReferenceWarning`).
 
     Parameters
     ----------
@@ -77,8 +80,10 @@ def fly(
         If anything that was given cannot be used; one line that says how to mend it.
     """
     named = controller if isinstance(controller, str) else None
+    if controller is not None and named is None:
+        _require_no_settings(settings or {})
     checked = prepare(scenario, named, settings, seed, allow_code)
-    warn_of_vehicle(checked)
+    doubts.warn(checked, own_controller=not (controller is None or named is not None))
     own: Own = {} if controller is None or named is not None else {CONTROLLER: as_controller(controller)}
     batch = assemble(checked, own)
     python_only = any(part.python_only for _, part in batch.loop.each())
@@ -87,7 +92,20 @@ def fly(
         raise InputError(
             f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
         )
-    return _flight(checked, _run(batch, name, checked.period), batch, 0, name, controller if own else None)
+    flight = _flight(checked, _run(batch, name, checked.period), batch, 0, name, controller if own else None)
+    if doubt := doubts.rattling(flight.scores, flight.label):
+        warnings.warn(doubt.says, doubt.kind, stacklevel=2)
+    return flight
+
+
+def _require_no_settings(settings: Mapping[str, Any]) -> None:
+    """Refuse settings of the scenario's controller where it does not fly."""
+    for key in settings:
+        if isinstance(key, str) and key.partition(".")[0] == CONTROLLER.name:
+            raise InputError(
+                f"settings: {key} has no effect on a controller that is an object; give the object its settings, or "
+                "name its class, FILE.py:NAME"
+            )
 
 
 def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list[Flight]:
@@ -108,7 +126,7 @@ def fly_all(scenarios: Sequence[Scenario], *, engine: str | None = None) -> list
     require(scenarios, Sequence, "scenarios", f"a list of {allowed}")
     for scenario in scenarios:
         require(scenario, Scenario, "scenarios", allowed)
-        warn_of_vehicle(scenario)
+        doubts.warn(scenario)
     name = default_engine(len(scenarios)) if engine is None else engine
     batch = assemble_all(scenarios)
     recording = _run(batch, name, scenarios[0].period)

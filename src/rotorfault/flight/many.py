@@ -19,6 +19,7 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.progress import Bar
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch
+from rotorfault.flight import doubts
 from rotorfault.flight.assembly import Group, assemble_group, build
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly, prepare
@@ -28,7 +29,6 @@ from rotorfault.maths.geometry import Vec3
 from rotorfault.model.telemetry import Layout
 from rotorfault.results.score_table import ScoreTable, score_table
 from rotorfault.scenario.scenario import Scenario
-from rotorfault.scenario.vehicle_lines import warn_of_vehicle
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -160,7 +160,7 @@ def fly_many(
     count = len(next(iter(columns.values())))
     groups = groups_of(checked, columns)
     for group in groups:
-        warn_of_vehicle(group.scenario)
+        doubts.warn(group.scenario, varied=True)
     layouts = [build(group.scenario).layout for group in groups] if record else []
     rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)
     width = len(rows[0])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
-from rotorfault.base.errors import VehicleWarning
 from rotorfault.model.vehicle_check import vehicle_warnings
 from rotorfault.scenario.scenario import Scenario
 
@@ -22,16 +19,3 @@ def vehicle_lines(scenario: Scenario) -> list[str]:
     more = [line for line in vehicle_warnings(scenario.mismatch.applied(scenario.vehicle)) if line not in lines]
     about = f"vehicle '{scenario.vehicle.name}'"
     return [f"{about}: {line}" for line in lines] + [f"{about} with its mismatch: {line}" for line in more]
-
-
-def warn_of_vehicle(scenario: Scenario, stacklevel: int = 2) -> None:
-    """Warn (`VehicleWarning`) of each of `vehicle_lines`.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    stacklevel : int
-        Of the function that calls this one, whose caller the warning is for: 2.
-    """
-    for line in vehicle_lines(scenario):
-        warnings.warn(line, VehicleWarning, stacklevel=stacklevel + 1)

@@ -94,7 +94,8 @@ class Objective(NamedTuple):
 
 def onset_of(scenario: Scenario) -> float:
     """Time in s at which the first fault begins; infinite without one."""
-    context = Context(scenario.mismatch.applied(scenario.vehicle), scenario.period)
+    # When a fault begins depends on no vehicle; the true one is not worth its making for each flight of a search.
+    context = Context(scenario.vehicle.vehicle, scenario.period)
     faults = [part.make() for part in scenario.all(FAULT)]
     return min((float(fault.onset(fault.parameters(context))) for fault in faults), default=math.inf)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from click.testing import Result as CliResult
+from gates import needs_simd
 from typer.testing import CliRunner
 
 import rotorfault as rf
@@ -32,6 +33,7 @@ def run(*words: str) -> CliResult:
     return CliRunner().invoke(app, list(words))
 
 
+@needs_simd
 def test_numbers_that_come_with_the_package_are_flown_by_its_gains() -> None:
     """One row anew; and what is the same for all rows."""
     kept = ranges.kept()
@@ -43,6 +45,7 @@ def test_numbers_that_come_with_the_package_are_flown_by_its_gains() -> None:
         assert new.cases["set-point"].cost == pytest.approx(old.cases["set-point"].cost, rel=0.01)
 
 
+@needs_simd
 def test_shipped_presets_fly_here_as_they_do_by_themselves() -> None:
     ours, theirs = ranges.flown([one._replace(cases={}) for one in ranges.kept().shipped], ["set-point"])
     for one, law in ((ours, "roismc"), (theirs, "smc")):

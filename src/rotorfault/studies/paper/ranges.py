@@ -32,6 +32,7 @@ from rotorfault.flight.candidates import assemble_with
 from rotorfault.results.score_table import score_table
 from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES
+from rotorfault.tuning.search import tune
 from rotorfault.tuning.space import BOXES, candidate
 from rotorfault.tuning.training import GROUPS
 
@@ -107,9 +108,6 @@ class _Search(NamedTuple):
 
 def _searched(search: _Search) -> dict[str, Any]:
     """Gains of one search; in a worker process."""
-    # cma is an extra, which flying the kept gains does not need.
-    from rotorfault.tuning.search import tune
-
     cell, budget = search.cell, search.budget
     found = tune(
         search.law, generations=budget.generations, population=budget.population, seed=cell.seed,
