@@ -41,6 +41,9 @@ LAZY = {
         "rotorfault.engine.simd": "llvmlite need not be installed",
     },
     "rotorfault.engine.taylor": {"heyoka": OPTIONAL},
+    "rotorfault.flight.doubts": {
+        "rotorfault.analysis.trim": "brings scipy, which takes longer to load than a flight to fly"
+    },
     "rotorfault.flight.flight": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},

@@ -29,6 +29,7 @@ HEAVY = {
 
 # What a flight takes.
 FLIGHT = {
+    "analysis",
     "base",
     "maths",
     "model",
@@ -92,7 +93,7 @@ def test_a_flight_from_the_command_line_loads_its_warnings_and_nothing_else(tmp_
     (found,) = steps(short, cwd=tmp_path)
     assert "h5py" in found
     assert not packages(found) & HEAVY
-    assert rooms(found) == FLIGHT | {"analysis", "cli"}
+    assert rooms(found) == FLIGHT | {"cli"}
     assert list(tmp_path.glob("results/*/flight.nc"))
 
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from rotorfault.analysis.hover import critical_loss, hover_margin
 from rotorfault.analysis.sampling_check import sampled_data_warnings
-from rotorfault.analysis.trim import trim_report
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.presets import presets, record
 from rotorfault.base.errors import ControllerWarning, FaultWarning, InputError, ReferenceWarning, VehicleWarning
@@ -178,6 +177,9 @@ def _made_for(part: Part[Any]) -> Mapping[str, Any]:
 @lru_cache(maxsize=64)
 def _trim_warnings(vehicle: str, part: Part[Any], period: float) -> tuple[str, ...]:
     """Warnings of `rotorfault trim` for a vehicle as JSON; they take a third of a second, so they are kept."""
+    # Brings scipy, which takes longer to load than most flights take to fly.
+    from rotorfault.analysis.trim import trim_report
+
     try:
         return trim_report(VehicleFile.model_validate_json(vehicle), part.make(), period=period).warnings
     except InputError:
