@@ -115,7 +115,7 @@ def known_between(view: View, lower: Array, upper: Array) -> NDArray[np.bool_]:
 def pieces(values: Array, which: NDArray[np.bool_]) -> Counts:
     """Indices of the cells of a broken line over some of the connections between neighbours; -1 is a gap."""
     found: list[int] = []
-    for i in np.flatnonzero(which & ~np.isnan(values[:-1]) & ~np.isnan(values[1:])):
+    for i in np.flatnonzero(which & ~np.isnan(values[:-1]) & ~np.isnan(values[1:])).tolist():
         found += [i + 1] if found and found[-1] == i else [-1, i, i + 1]
     return np.array(found, dtype=np.int64)
 

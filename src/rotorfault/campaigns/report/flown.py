@@ -147,7 +147,7 @@ def place_text(maps: Maps, at: tuple[int, ...]) -> str:
 
 def _facts(maps: Maps, versions: Mapping[str, str]) -> tuple[Fact, ...]:
     study = maps.study
-    names = [part.name for part in (*study.axis, *study.draw)]
+    names = _varied(study)
     libraries = [f"{name} {version}" for name, version in versions.items() if name != "source"]
     source = f"; source {versions['source'][:12]}" if "source" in versions else ""
     facts = [
@@ -175,6 +175,11 @@ def _sampling(maps: Maps) -> tuple[str, str]:
     if refine.budget:
         rule += f"; {refine.budget:,} flights in all at most"
     return f"{maps.flights:,}{left_out}", rule
+
+
+def _varied(study: Study) -> set[str]:
+    """What axes and draws vary."""
+    return {part.name for part in study.axis} | {draw.name for draw in study.draw}
 
 
 def _vehicles(study: Study, names: Collection[str]) -> list[str]:
@@ -222,7 +227,7 @@ def _kinds(scenario: Scenario) -> dict[str, str]:
 
 def _variant(study: Study, k: int) -> FlownVariant:
     variant, scenario = study.variant[k], study.scenarios[k]
-    varied = {part.name for part in (*study.axis, *study.draw)}
+    varied = _varied(study)
     controller = scenario[CONTROLLER]
     told = ("controller.kind", "controller.preset")
     own = {key: value for key, value in variant.settings.items() if key not in told}

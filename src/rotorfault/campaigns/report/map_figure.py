@@ -179,11 +179,11 @@ def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Art
     x, y = maps.views[:2]
     guessed = coarse(x) or coarse(y)
     for line in crossed.lines:
-        at = x.coordinates(line[:, 0]), y.coordinates(line[:, 1])
+        along = x.coordinates(line[:, 0]), y.coordinates(line[:, 1])
         if guessed:
-            axes.plot(*at, zorder=3.1, **GUESS)
+            axes.plot(*along, zorder=3.1, **GUESS)
         else:
-            _line(axes, *at, style, 3.0)
+            _line(axes, *along, style, 3.0)
     if not len(crossed.points):
         return
     at = np.column_stack([x.coordinates(crossed.points[:, 0]), y.coordinates(crossed.points[:, 1])])
