@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import time
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import Any
 import killable
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 from campaign_studies import TINY, fly_in_small_blocks
 from gates import needs_simd
@@ -23,7 +23,6 @@ from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
 from rotorfault.campaigns.replay import differences, identifier_of
-from rotorfault.campaigns.report.maps import maps
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
@@ -57,20 +56,66 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.usefixtures("small_blocks")
-def test_what_is_said_at_the_end_is_what_the_report_says(tmp_path: Path) -> None:
-    """Over several rounds: of the first, for later ones fly where success is uncertain."""
+def test_rounds_are_told_as_they_are_flown_and_not_again(tmp_path: Path) -> None:
     said: list[str] = []
     study = tiny()
     with run.open_store(study, tmp_path / "campaign", False) as store:
-        run.fly(study, store, InProcess(), said.append)
-    assert len(said) > 1
-    page = maps(study, pq.read_table(tmp_path / "campaign" / "flights.parquet"))
-    rates = [f"{variant.label} {100.0 * float(variant.total.estimate):.1f} %" for variant in page.variants]
-    assert said[-1].endswith(f"success over the map, by round 1: {', '.join(rates)}")
-    every = [variant.success_rate.mean() for variant in page.variants]
-    assert every != pytest.approx([float(variant.total.estimate) for variant in page.variants]), (
-        "differs, by more flights"
-    )
+        done = run.fly(study, store, InProcess(), said.append)
+    assert len(said) == done.rounds > 1
+    assert said[0] == "round 1: 72 flights, 4 of each variant in each cell"
+    assert said[-1].endswith(f"{done.total:,} so far")
+    with run.open_store(study, tmp_path / "campaign", True) as store:
+        again = run.fly(study, store, InProcess(), said.append)
+    assert (again.flights, again.total) == (0, done.total)
+    assert len(said) == done.rounds
+
+
+def test_a_complete_campaign_is_known_by_its_study(tmp_path: Path) -> None:
+    folder = tmp_path / "campaign"
+    assert not run.is_complete(tiny(), folder)
+    complete(tiny(), folder)
+    assert run.is_complete(tiny(), folder)
+    assert not run.is_complete(tiny(seed=7), folder)
+    (folder / "flights.parquet").unlink()
+    assert not run.is_complete(tiny(), folder)
+
+
+def test_a_complete_campaign_is_given_back_and_not_flown_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    folder = tmp_path / "campaign"
+    first = rotorfault.campaign(TINY, folder)
+    before = {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a block was flown")
+
+    monkeypatch.setattr(run, "fly_block", refuse)
+    again = rotorfault.campaign(TINY, folder, say=said.append)
+    assert {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()} == before
+    flights = first.table().num_rows
+    assert said == [f"tiny is complete, nothing is left to fly: {flights} flights in {folder / 'flights.parquet'}"]
+    assert str(again.answer()) == str(first.answer())
+    with pytest.raises(InputError, match=r"another study \(seed: 0 there, 5 here\)"):
+        rotorfault.campaign(TINY, folder, seed=5)
+
+
+def test_the_study_of_a_folder_flies_the_same_table(tmp_path: Path) -> None:
+    """The command that the page gives."""
+    first = rotorfault.campaign(TINY, tmp_path / "one", seed=3)
+    second = rotorfault.campaign(first.folder / "study.json", tmp_path / "two")
+    tables = [(folder / "flights.parquet").read_bytes() for folder in (first.folder, second.folder)]
+    assert tables[0] == tables[1]
+
+
+def test_a_page_older_than_the_table_is_none(tmp_path: Path) -> None:
+    done = rotorfault.campaign(TINY, tmp_path / "campaign")
+    assert done.page is None
+    (done.folder / "report.html").write_text("a page")
+    assert done.page == done.folder / "report.html"
+    os.utime(done.page, ns=(0, 0))
+    assert done.page is None
 
 
 # --------------------------------------------------------------------------------------------------- the same table

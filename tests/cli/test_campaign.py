@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "tiny.toml").write_text(STUDY)
     done = started("campaign", "tiny.toml", "--no-report", cwd=here)
     assert done.returncode == 0, done.stderr
-    assert "success over the map" in done.stderr
+    assert "success over the map" in done.stdout
+    assert "50 % success along loss" in done.stdout.splitlines()[-5]
     assert not (here / "campaigns" / "tiny" / "report.html").exists()
     return here
 
@@ -64,14 +66,22 @@ def test_it_writes_a_table_with_one_row_per_flight(folder: Path) -> None:
     assert json.loads((folder / "campaigns" / "tiny" / "study.json").read_text())["study"]["name"] == "tiny"
 
 
-def test_a_complete_campaign_is_refused_anew_and_resumed_at_once(folder: Path) -> None:
+def test_a_complete_campaign_says_so_and_is_not_flown_again(folder: Path) -> None:
     before = (folder / "campaigns" / "tiny" / "flights.parquet").read_bytes()
-    again = run("campaign", "tiny.toml", cwd=folder)
-    assert again.returncode == 2
-    assert "--resume" in again.stderr
-    resumed = run("campaign", "tiny.toml", "--resume", "--no-report", cwd=folder)
-    assert resumed.returncode == 0, resumed.stderr
-    assert (folder / "campaigns" / "tiny" / "flights.parquet").read_bytes() == before
+    for options in ([], ["--resume"]):
+        again = run("campaign", "tiny.toml", "--no-report", *options, cwd=folder)
+        assert again.returncode == 0, again.stderr
+        assert "tiny is complete, nothing is left to fly" in again.stderr
+        assert again.stdout.startswith("tiny: ")
+        assert (folder / "campaigns" / "tiny" / "flights.parquet").read_bytes() == before
+
+
+def test_an_interrupted_campaign_asks_for_resume(folder: Path) -> None:
+    there = folder / "campaigns" / "tiny"
+    half = folder / "half"
+    shutil.copytree(there, half)
+    (half / "flights.parquet").unlink()
+    assert_refused(run("campaign", "tiny.toml", "--out", "half", cwd=folder), "complete it with --resume")
 
 
 def test_a_replay_writes_the_whole_flight(folder: Path) -> None:

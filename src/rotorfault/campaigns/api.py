@@ -16,7 +16,10 @@ from rotorfault.base.executors import executor_of
 from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
 from rotorfault.campaigns.replay import differences, replay
+from rotorfault.campaigns.report.answer import Answer, answer
 from rotorfault.campaigns.report.maps import Maps, maps
+from rotorfault.campaigns.store.folder import FLIGHTS, PAGE, STUDY
+from rotorfault.campaigns.store.identity import read_identity
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, changed, load_study, sources_of, study_from
 from rotorfault.flight import doubts
@@ -63,12 +66,25 @@ class Campaign:
         """Success rates, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
         return maps(self.study, self.table())
 
+    def answer(self) -> Answer:
+        """What was found: shares of the map, boundaries, differences; as text what the terminal ends with."""
+        return answer(self.maps())
+
+    @property
+    def page(self) -> Path | None:
+        """The page of the report, if it is there and no older than the table of all flights."""
+        page, table = self.folder / PAGE, self.folder / FLIGHTS
+        if not (page.is_file() and table.is_file()):
+            return None
+        return page if page.stat().st_mtime_ns >= table.stat().st_mtime_ns else None
+
     def report(self) -> list[Path]:
         """Write pictures and page; the page's path first."""
         # Loads Matplotlib and Plotly, which a campaign does not need.
         from rotorfault.campaigns.report.report import write
 
-        return write(self.study, self.table(), self.folder, self._store.identity.versions)
+        made_by = {**self._store.identity.versions, "source": self._store.identity.program}
+        return write(self.study, self.table(), self.folder, made_by)
 
     def replay(self, identifier: int) -> Flight:
         """Fly one of the flights once more, with everything recorded.
@@ -125,12 +141,13 @@ def campaign(
     allow_code: bool = False,
     say: Say = lambda _: None,
 ) -> Campaign:
-    """Fly a campaign.
+    """Fly a campaign; of one that is complete already, nothing is flown.
 
     Parameters
     ----------
     study : str, Path, mapping or Study
-        Name of a built-in study, path of a TOML file, tables as such a file holds, or a checked study.
+        Name of a built-in study, path of a TOML file or of the ``study.json`` of a campaign, tables as such a file
+        holds, or a checked study.
     out : str or Path, optional
         Folder; ``campaigns/NAME`` if not given.
     resume : bool
@@ -162,7 +179,7 @@ def campaign(
     if isinstance(study, Study):
         checked = study
     elif isinstance(study, (str, Path)):
-        checked = load_study(study, allow_code=allow_code)
+        checked = _study_at(study, allow_code)
     elif isinstance(study, Mapping):
         checked = study_from(dict(study), "study", allow_code)
     else:
@@ -175,10 +192,21 @@ def campaign(
     for scenario in checked.scenarios:
         doubts.warn(scenario, varied=True)
     executor = executor_of(workers, scheduler)
-    with run.open_store(checked, folder, resume, repair) as store:
+    complete = not (resume or repair) and run.is_complete(checked, folder)
+    with run.open_store(checked, folder, resume or complete, repair) as store:
         for damage in store.repaired:
             say(f"moved aside: {damage.name} ({damage.reason})")
         progress = run.fly(checked, store, executor, say)
-    table = folder / "flights.parquet"
-    say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")
+    table = folder / FLIGHTS
+    if progress.flights:
+        say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")
+    else:
+        say(f"{checked.name} is complete, nothing is left to fly: {progress.total:,} flights in {table}")
     return Campaign(folder, allow_code=checked.allows_code)
+
+
+def _study_at(place: str | Path, allow_code: bool) -> Study:
+    """A study by its name, from its file, or from the folder of a campaign that has flown it."""
+    if Path(place).name == STUDY:
+        return study_from(read_identity(Path(place)).study, str(place), allow_code)
+    return load_study(place, allow_code=allow_code)

@@ -22,11 +22,12 @@ from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.flight_set import FlightSet, values_of
 from rotorfault.campaigns.rounds import Tally, blocks, next_round
+from rotorfault.campaigns.store.folder import FLIGHTS, STUDY
+from rotorfault.campaigns.store.identity import read_identity
 from rotorfault.campaigns.store.store import Key, Store
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.assembly import assemble_group
 from rotorfault.flight.sweep import checked_columns, groups_of
-from rotorfault.maths.arrays import Array
 
 BYTES_PER_FLIGHT = 400
 ROOMS = (
@@ -41,7 +42,8 @@ class Progress(NamedTuple):
     """How far a campaign is."""
 
     rounds: int
-    flights: int
+    flights: int  # flown now
+    total: int
     successes: int
     seconds: float
 
@@ -58,6 +60,19 @@ def open_store(study: Study, folder: Path, resume: bool, repair: bool = False) -
     if resume or repair:
         return Store.open(folder, study=tables, digest=digest, own=own, write=True, repair=repair)
     return Store.create(folder, tables, digest, space=int(study.most_flights * BYTES_PER_FLIGHT), own=own)
+
+
+def is_complete(study: Study, folder: Path) -> bool:
+    """Whether a folder holds this very campaign with all its flights, so that nothing is left to fly.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+    """
+    if not ((folder / STUDY).is_file() and (folder / FLIGHTS).is_file()):
+        return False
+    return not read_identity(folder / STUDY).unlike(study.as_tables(), source_digest(*ROOMS), study.own_sources)
 
 
 def check(study: Study) -> None:
@@ -86,7 +101,7 @@ def fly(study: Study, store: Store, executor: Executor, say: Say = lambda _: Non
         Held for writing.
     executor : Executor
     say : callable
-        Is given a line after each round.
+        Is given a line after each round of which something was flown.
 
     Raises
     ------
@@ -97,22 +112,21 @@ def fly(study: Study, store: Store, executor: Executor, say: Say = lambda _: Non
     tally = Tally(study)
     work = partial(fly_block, study, threads=executor.threads)
     keys: list[Key] = []
-    rates = np.zeros(len(study.variant))
     for round in itertools.count():
         flights = next_round(study, tally.successes, tally.trials)
         if not flights.size:
             break
         tasks = [Task((round, block), part, part.size) for block, part in enumerate(blocks(flights))]
         parts = _Parts(store)
-        flown += run_missing(tasks, work, parts, executor, f"round {round + 1}", "flights", parts.note)
+        new = run_missing(tasks, work, parts, executor, f"round {round + 1}", "flights", parts.note)
         keys += [task.key for task in tasks]
         for task in tasks:
             tally.add(store.get(*task.key))
-        if not round:
-            rates = (tally.successes / tally.trials).mean(axis=1)
-        say(_summary(study, round, int(tally.trials.sum()), rates))
+        flown += new
+        if new:
+            say(_summary(study, round, flights.size, int(tally.trials.sum())))
     store.finish(keys)
-    return Progress(round, flown, int(tally.successes.sum()), time.monotonic() - start)
+    return Progress(round, flown, int(tally.trials.sum()), int(tally.successes.sum()), time.monotonic() - start)
 
 
 class _Parts:
@@ -137,13 +151,12 @@ class _Parts:
         return f"{100.0 * self._successes / self._flights:.0f} % of them successful"
 
 
-def _summary(study: Study, round: int, flights: int, rates: Array) -> str:
+def _summary(study: Study, round: int, new: int, flights: int) -> str:
     """A line after each round.
 
-    The success rates are the report's: of the first round, each cell counting alike. How many flights a cell has in
-    later rounds is decided by results, and rates of all flights would be other numbers.
+    What was found stands at the end alone (`rotorfault.campaigns.report.answer`): by more flights where results ask
+    for more, a share of all flights so far would be of no map.
     """
-    each = ", ".join(
-        f"{variant.label} {100.0 * rate:.1f} %" for variant, rate in zip(study.variant, rates, strict=True)
-    )
-    return f"round {round + 1}: {flights:,} flights so far; success over the map, by round 1: {each}"
+    if not round:
+        return f"round 1: {new:,} flights, {study.refine.initial} of each variant in each cell"
+    return f"round {round + 1}: {new:,} flights more where success is uncertain, {flights:,} so far"

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 @app.command()
 def campaign(
     study: Annotated[
-        str | None, typer.Argument(help="Built-in study (see 'rotorfault list studies') or a TOML file.")
+        str | None,
+        typer.Argument(
+            help="Built-in study (see 'rotorfault list studies'), a TOML file, or a campaign's study.json."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the campaign; campaigns/STUDY if not given.")
@@ -44,7 +47,8 @@ def campaign(
     """Fly a survival campaign: thousands of flights over a map, most of them where success is uncertain.
 
     Writes study.json, parts/*.parquet while it flies, and at the end flights.parquet, report.html and figures/.
-    Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table.
+    Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table. Ends with what was
+    found; so it does, and flies nothing, where the campaign is complete already.
 
     Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
     """
@@ -56,7 +60,9 @@ def campaign(
             raise InputError("--report-only needs the folder of a campaign; give it with --out")
         if study is not None or resume or repair or not report:
             raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
-        _report(Campaign(out, allow_code=allow_code))
+        there = Campaign(out, allow_code=allow_code)
+        _report(there)
+        say(str(there.answer()))
         return
     if study is None:
         raise InputError(
@@ -71,7 +77,8 @@ def campaign(
     except KeyboardInterrupt:
         raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
     if report:
-        _report(done)
+        _report(done, done.page)
+    say(str(done.answer()))
 
 
 @app.command()
@@ -120,10 +127,13 @@ def replay(
         say("its numbers are those of the campaign's table")
 
 
-def _report(campaign: Campaign) -> None:
-    """Pictures and page of a campaign, finished or not."""
+def _report(campaign: Campaign, page: Path | None = None) -> None:
+    """Pictures and page of a campaign, finished or not; nothing anew where the page is there."""
     from rotorfault.base.progress import Busy
 
+    if page is not None:
+        say(f"report in {page}")
+        return
     with Busy("making the report"):
         paths = campaign.report()
     pictures = ", ".join(path.name for path in paths if path.suffix == ".png")

@@ -8,7 +8,7 @@ from campaign_tables import LOSS, TWO_FAULTS, WIND, falling, study_of, table_of
 
 from rotorfault.campaigns.report import curves
 from rotorfault.campaigns.report.maps import Maps, maps
-from rotorfault.campaigns.sampling.refine import Refinement, intervals
+from rotorfault.campaigns.sampling.boundary import Boundary
 from rotorfault.model.vehicle_file import load_vehicle
 
 
@@ -22,13 +22,21 @@ def test_boundaries_go_where_they_must(plane: Maps) -> None:
     np.testing.assert_allclose(half.lines[0][:, 0], 0.4)
     high = curves.crossings(plane, plane.variants[1], part, 0.99)
     np.testing.assert_allclose(high.points[:, 0], 0.2 + 0.2 * 0.02)
-    bounds = intervals([24, 12, 0], 24, Refinement(initial=24, block=24, most=24))
     flown = study_of([LOSS, WIND], refine={"initial": 24, "block": 24, "most": 24})
     many = maps(flown, table_of(flown, falling, lambda *_: 24))
     half = curves.crossings(many, many.variants[1], part, 0.5)
-    lower = 0.2 + 0.2 * (bounds.lower[0] - 0.5) / (bounds.lower[0] - bounds.lower[1])
-    np.testing.assert_allclose(half.lower, lower)
-    np.testing.assert_allclose(half.upper, 0.8 - lower)
+    # All of 24 are surely more than half, none surely less, 12 neither: from cell to cell.
+    np.testing.assert_allclose(half.lower, 0.2)
+    np.testing.assert_allclose(half.upper, 0.6)
+
+
+def test_intervals_of_crossings_reach_to_cells() -> None:
+    """Between cells nothing was flown: an end moves outwards to a cell, and stays where it is one or is open."""
+    x = np.array([0.0, 1.0, 2.0, 3.0])
+    ends = np.array([[0.0, 0.3, 1.0, 1.2, np.nan]]), np.array([[0.1, 1.0, 2.9, np.nan, 3.0]])
+    moved = curves.to_cells(Boundary(np.zeros((1, 5)), *ends, np.ones((1, 5))), x)
+    np.testing.assert_array_equal(moved.lower, [[0.0, 0.0, 1.0, 1.0, np.nan]])
+    np.testing.assert_array_equal(moved.upper, [[1.0, 1.0, 3.0, np.nan, 3.0]])
 
 
 def test_boundaries_are_looked_for_across_them() -> None:

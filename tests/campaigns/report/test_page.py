@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 from html.parser import HTMLParser
@@ -9,11 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_tables import FIRST, LOSS, STUDIES, WIND, falling, table_of
+from campaign_tables import FIRST, LOSS, STUDIES, WIND, falling, study_of, table_of
 
 from rotorfault.campaigns.grades import GRADES
 from rotorfault.campaigns.report import charts, curves, report
+from rotorfault.campaigns.report.answer import answer
 from rotorfault.campaigns.report.maps import Maps, maps
+from rotorfault.report.page_style import STYLE
 
 
 class Parsed(HTMLParser):
@@ -78,6 +81,23 @@ def test_page_has_the_numbers_and_commands_of_every_cell(page: str, plane: Maps)
         assert f"<dt>{grade}" in page
 
 
+def test_page_says_what_was_found_in_the_words_of_the_terminal(page: str, plane: Maps) -> None:
+    told = answer(plane)
+    shown = page.replace("\u00a0", " ")
+    for text in (*(variant.share for variant in told.variants), told.pairs[0].difference, told.pairs[0].verdict):
+        assert text in shown
+    for variant in told.variants:
+        for line in variant.lines:
+            assert f'{line.text} <span class="soft">at {line.where}</span>' in page
+
+
+def test_page_is_for_light_and_dark_and_for_a_telephone(page: str) -> None:
+    assert STYLE in page
+    assert "prefers-color-scheme: dark" in page
+    for table in re.findall(r"<table[^>]*>", page):
+        assert 'class="stacked"' in table
+
+
 def test_charts_are_what_plotly_takes() -> None:
     graph_objects = pytest.importorskip("plotly.graph_objects")
     for name, study in STUDIES.items():
@@ -91,5 +111,41 @@ def test_charts_are_what_plotly_takes() -> None:
             specs = [charts.success_chart(found, 0, part, cells) for part in parts]
             specs += [charts.difference_chart(found, 0, part, cells) for part in parts]
             assert len(specs) == 2 * (2 if name == "space" else 1)
+        assert not any(trace["name"] == "not flown" for spec in specs for trace in spec["data"])
         for spec in specs:
             graph_objects.Figure(json.loads(json.dumps(spec, allow_nan=False)))
+
+
+def test_cells_without_flights_are_hatched_and_those_without_success_are_not() -> None:
+    """None of eight flights in the first cells succeeds; the others were not flown."""
+    study = STUDIES["plane"]
+    found = maps(study, table_of(study, lambda *_: 0.0, lambda _, cell: 8 if cell < 8 else 0))
+    chart = charts.success_chart(
+        found, 0, curves.slices(found)[0][0], charts.variant_cells(found, 0, Path("campaign"))
+    )
+    heat, hatched = chart["data"][:2]
+    assert np.array(heat["z"], dtype=float)[0, 0] == 0.0
+    assert heat["colorscale"][0][1] != chart["layout"]["plot_bgcolor"]
+    assert hatched["name"] == "not flown"
+    assert hatched["fillpattern"]["shape"] == "/"
+    assert hatched["x"].count(None) == np.isnan(found.variants[0].success_rate).sum() == 7
+
+
+def test_lines_join_cells_only_where_what_lies_between_is_known() -> None:
+    def joined(values: list[float], flights: int) -> dict[str, int]:
+        """Joints between neighbours by kind of line."""
+        study = study_of([{"name": "loss", "values": values}], refine={"initial": flights, "most": flights})
+        found = maps(study, table_of(study, lambda _, place: float(place[0] < 4), lambda *_: flights))
+        chart = charts.success_lines_chart(found, 0, charts.variant_cells(found, 0, Path("campaign")))
+        lines = [trace for trace in chart["data"] if trace["mode"] == "lines"]
+        return {
+            trace["line"].get("dash", "solid"): sum(
+                a is not None and b is not None for a, b in itertools.pairwise(trace["x"])
+            )
+            for trace in lines
+        }
+
+    fine = [0.1 * k for k in range(11)]
+    assert joined(fine, 4) == {"solid": 10}  # nothing is sure of four flights
+    assert joined(fine, 100) == {"solid": 9, "dash": 1}  # between the last success and the first failure
+    assert joined(fine[:5], 4) == {"dash": 4}  # coarse

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from rotorfault.campaigns.grades import GRADES
-from rotorfault.campaigns.report.axis_drawing import borders, columns, label, legend_columns, places, scale_x
-from rotorfault.campaigns.report.line_figure import look
+from rotorfault.campaigns.report.axis_drawing import borders, coarse, columns, label, legend_columns, places, scale_x
+from rotorfault.campaigns.report.line_figure import join, look
 from rotorfault.campaigns.report.maps import PROBABILITIES, Maps
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, new_figure, padded, shown
@@ -104,8 +104,11 @@ def _bars(axes: Axes, maps: Maps, quantiles: list[Array]) -> bool:
     for k, (lower, median, upper) in enumerate(quantiles):
         style: dict[str, Any] = look(k)
         here = at + width * (k - 0.5 * (len(quantiles) - 1)) / len(quantiles)
-        joined = style if x.numeric else {**style, "linestyle": "none"}
-        axes.plot(here, np.where(np.isinf(median), np.nan, median), marker="o", markersize=3.0, **joined)
+        marked = np.where(np.isinf(median), np.nan, median)
+        if x.numeric:
+            # No interval says whether medians differ: it is the spacing of cells alone that counts.
+            join(axes, here, marked, np.full(len(here) - 1, not coarse(x)), style)
+        axes.plot(here, marked, **{**style, "linestyle": "none", "marker": "o", "markersize": 3.0})
         some = np.isfinite(lower)
         # To the top of the axis and beyond, where there is no upper end.
         top = np.where(np.isinf(upper), 2.0 * high, upper)

@@ -8,15 +8,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
+from rotorfault.campaigns.flight_set import Counts
 from rotorfault.campaigns.report.maps import View
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLUE, ORANGE, SKY, shown, unit
 
 MOST_TICKS = 9
+MOST_STEP = 0.2  # of an axis, between cells that may be joined by a line
 WIDTH_MM, MM_PER_LETTER, MM_PER_HANDLE = 160.0, 1.5, 13.0  # of a legend, as its letters are
-# From pale (all failed) to deep (all successful): lines in black and vermilion are seen on all of it.
-SUCCESS_COLOURS = ("#FFF6D6", "#CFE4EE", SKY, "#2A85BF")
+# From sand (all failed) to blue (all successful), ever darker, so also in grey: lines in black and vermilion are seen
+# on all of it. No cell has a colour that could be taken for the ground, which is hatched where nothing was flown.
+SUCCESS_COLOURS = ("#F7DF9C", "#BFDDE6", SKY, "#2A85BF")
 FLIGHTS_COLOURS = ("#F4F4F4", "#6E6E6E")
 DIFFERENCE_COLOURS = ("#B35A00", ORANGE, "#F7F7F7", SKY, BLUE)
 
@@ -75,6 +79,45 @@ def legend_columns(labels: Iterable[str], most: int = 4) -> int:
     """Entries beside each other in a legend, so that it stays on the page."""
     longest = max(map(len, labels), default=1)
     return max(1, min(most, int(WIDTH_MM // (MM_PER_LETTER * longest + MM_PER_HANDLE))))
+
+
+def coarse(view: View) -> bool:
+    """Whether cells lie so far apart that nothing is drawn between them as if it were known.
+
+    The rule: a step is longer than a fifth of what is drawn of the axis; so it is with fewer than six even values.
+    """
+    at = places(view)
+    return len(at) > 1 and bool(np.diff(at).max() > (MOST_STEP + 1e-9) * (at[-1] - at[0]))
+
+
+def known_between(view: View, lower: Array, upper: Array) -> NDArray[np.bool_]:
+    """Between which neighbouring cells a curve may be drawn as a line; elsewhere it is a faint, dashed connection.
+
+    The rule: the axis is not coarse, and the intervals of the two cells overlap. Where they do not, the curve changes
+    by more than can be seen of it, and where in between nobody has looked.
+
+    Parameters
+    ----------
+    view : View
+    lower, upper : ndarray, shape (cells,)
+        Of the intervals; NaN in cells without flights.
+
+    Returns
+    -------
+    ndarray of bool, shape (cells - 1,)
+    """
+    if coarse(view):
+        return np.zeros(max(len(lower) - 1, 0), dtype=bool)
+    # Asked so that NaN is no overlap.
+    return np.asarray((lower[1:] <= upper[:-1]) & (lower[:-1] <= upper[1:]))
+
+
+def pieces(values: Array, which: NDArray[np.bool_]) -> Counts:
+    """Indices of the cells of a broken line over some of the connections between neighbours; -1 is a gap."""
+    found: list[int] = []
+    for i in np.flatnonzero(which & ~np.isnan(values[:-1]) & ~np.isnan(values[1:])).tolist():
+        found += [i + 1] if found and found[-1] == i else [-1, i, i + 1]
+    return np.array(found, dtype=np.int64)
 
 
 def columns(count: int) -> int:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import html
 import math
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,23 +15,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.report.answer import signed
 from rotorfault.campaigns.report.axis_drawing import (
     DIFFERENCE_COLOURS,
     SUCCESS_COLOURS,
     borders,
+    coarse,
+    known_between,
     label,
+    pieces,
     places,
     ticks,
 )
 from rotorfault.campaigns.report.curves import LEVELS, Crossings, Slice, crossings, edges
+from rotorfault.campaigns.report.flown import command, place_text, variant_option
 from rotorfault.campaigns.report.limits import Limits
 from rotorfault.campaigns.report.maps import Maps, Pairing, VariantMap, View
 from rotorfault.campaigns.sampling.statistics import Array
-from rotorfault.report.style import BLACK, BLUE, VERMILION
+from rotorfault.report.style import BLACK, VERMILION
 
 Spec = dict[str, Any]
 HEIGHT = 430  # pixels
-GREY_BAR, GREY_LINE = "rgba(0,0,0,0.55)", "#8a8a8a"
+GREY_BAR, GREY_LINE, FAINT = "rgba(0,0,0,0.55)", "#8a8a8a", "rgba(43,140,208,0.6)"
+GROUND = "#d9d9d9"  # of maps, where nothing was flown
+MARKS = "#2b8cd0"  # seen on light and on dark paper
 DASHES = {0.5: "solid", 0.99: "dot"}
 
 
@@ -55,7 +61,7 @@ def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
     variant = maps.variants[k]
     cells = np.empty(variant.cell.shape, dtype=object)
     for at in np.ndindex(*variant.cell.shape):
-        cells[at] = CellNote(_where(maps, at), _numbers(variant, at), *_replay(variant, at, folder))
+        cells[at] = CellNote(place_text(maps, at), _numbers(variant, at), *_replay(variant, at, folder))
     return cells
 
 
@@ -66,7 +72,7 @@ def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
     for at in np.ndindex(*cell.shape):
         number = max(int(pairing.first_apart[at]), 0)
         commands = tuple(
-            _command(folder, f"--cell {cell[at]} {_variant(name)} --number {number}")
+            command(folder, f"--cell {cell[at]} {variant_option(name)} --number {number}")
             for name in (pairing.first, pairing.second)
         )
         apart = (
@@ -74,7 +80,7 @@ def pairing_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
             if pairing.first_apart[at] >= 0
             else "the first flight"
         )
-        cells[at] = CellNote(_where(maps, at), _comparison(pairing, at), commands, apart)
+        cells[at] = CellNote(place_text(maps, at), _comparison(pairing, at), commands, apart)
     return cells
 
 
@@ -82,6 +88,7 @@ def success_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -
     """Map of a variant's success rate, with boundaries and limits of hover."""
     variant = maps.variants[k]
     data = [_heat(maps, part, variant.success_rate, cells, SUCCESS_COLOURS, (0.0, 1.0), "success rate")]
+    data += _not_flown(maps, part.of(variant.success_rate), "not flown")
     if (edge := edges(maps, k, part)) is not None:
         for text, lines, dash in (
             ("limit of hover, yaw held", edge.with_yaw, "solid"),
@@ -91,7 +98,10 @@ def success_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]) -
     for level in LEVELS:
         crossed = crossings(maps, variant, part, level)
         name = f"{100.0 * level:g} % success"
-        data += _curve(maps, crossed.lines, name, {"color": BLACK, "width": 2, "dash": DASHES[level]})
+        style = {"color": BLACK, "width": 2, "dash": DASHES[level]}
+        if any(coarse(view) for view in maps.views[:2]):
+            style = {"color": GREY_BAR, "width": 1, "dash": "dash"}
+        data += _curve(maps, crossed.lines, name, style)
         data += _bars(maps, crossed, name)
     return {"data": data, "layout": _layout(maps.views)}
 
@@ -103,6 +113,7 @@ def difference_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]
     most = 0.0 if np.isnan(estimate).all() else float(np.nanmax(np.abs(estimate)))
     reach = max(math.ceil(10.0 * most) / 10.0, 0.1)
     data = [_heat(maps, part, estimate, cells, DIFFERENCE_COLOURS, (-reach, reach), "difference")]
+    data += _not_flown(maps, part.of(estimate), "no common flights")
     i, j = np.nonzero(part.of(pairing.significant))
     x, y = (places(view) for view in maps.views[:2])
     dots = {"color": BLACK, "size": 5}
@@ -116,7 +127,8 @@ def difference_chart(maps: Maps, k: int, part: Slice, cells: NDArray[np.object_]
 def success_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
     """A variant's success rate along the one axis of a study."""
     variant = maps.variants[k]
-    data = [_line(maps, variant.success_rate, variant.lower, variant.upper, cells, "success rate")]
+    data = _joined(maps, variant)
+    data.append(_points(maps, variant.success_rate, variant.lower, variant.upper, cells, "success rate"))
     layout = _layout(maps.views[:1], "success rate (–)", (-0.03, 1.05))
     edge = edges(maps, k, Slice("", (slice(None),)))
     for dash, lines in zip(("solid", "dash"), edge or (), strict=False):
@@ -132,18 +144,13 @@ def success_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
 def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Spec:
     """A difference along the one axis of a study."""
     pairing = maps.pairings[k]
-    line = _line(maps, *pairing.difference, cells, "difference")
-    line["marker"]["color"] = [BLUE if yes else "white" for yes in pairing.significant]
-    line["marker"]["line"] = {"color": BLUE, "width": 1.5}
+    line = _points(maps, *pairing.difference, cells, "difference")
+    line["marker"]["color"] = [MARKS if yes else "white" for yes in pairing.significant]
+    line["marker"]["line"] = {"color": MARKS, "width": 1.5}
     return {"data": [line], "layout": _layout(maps.views[:1], "difference of success rates (–)", (-1.05, 1.05))}
 
 
 # ------------------------------------------------------------------------------------------------ what cells say
-
-
-def _where(maps: Maps, at: tuple[int, ...]) -> str:
-    units = [f" {view.unit}" if view.unit not in ("", "1") else "" for view in maps.views]
-    return ", ".join(f"{v.title} {v.text(i)}{u}" for v, i, u in zip(maps.views, at, units, strict=True))
 
 
 def _numbers(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
@@ -183,20 +190,10 @@ def _comparison(pairing: Pairing, at: tuple[int, ...]) -> tuple[str, ...]:
 def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tuple[str, ...], str]:
     failures = int(variant.flights[at] - variant.successes[at])
     if failures:
-        command = _command(folder, f"--flight {variant.first_failure[at]}")
-        return (command,), f"the first of {failures} flights that failed"
-    command = _command(folder, f"--cell {variant.cell[at]} {_variant(variant.label)}")
-    return (command,), "the first flight; none failed" if variant.flights[at] else "the flight that would be first"
-
-
-def _command(folder: Path, options: str) -> str:
-    place = str(folder)
-    # Else it would be read as an option.
-    return f"rotorfault replay {shlex.quote(f'./{place}' if place.startswith('-') else place)} {options}"
-
-
-def _variant(label: str) -> str:
-    return f"--variant={shlex.quote(label)}" if label.startswith("-") else f"--variant {shlex.quote(label)}"
+        again = command(folder, f"--flight {variant.first_failure[at]}")
+        return (again,), f"the first of {failures} flights that failed"
+    again = command(folder, f"--cell {variant.cell[at]} {variant_option(variant.label)}")
+    return (again,), "the first flight; none failed" if variant.flights[at] else "the flight that would be first"
 
 
 def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
@@ -214,12 +211,6 @@ def percent(share: float) -> str:
     if math.isnan(value):
         return "–"
     return f"{value:.0f} %" if value in (0.0, 100.0) or 5.0 <= value <= 95.0 else f"{value:.1f} %"
-
-
-def signed(share: float) -> str:
-    """A difference in percentage points, with its sign."""
-    value = 100.0 * float(share)
-    return "–" if math.isnan(value) else f"{value:+.1f} %".replace("-", "−").replace("+0.0", "0").replace("−0.0", "0")
 
 
 def _quantiles(values: Array, unit: str, beyond: str) -> str:
@@ -249,7 +240,7 @@ def _heat(
         "zmin": ends[0],
         "zmax": ends[1],
         "colorscale": [[i / (len(chosen) - 1), colour] for i, colour in enumerate(chosen)],
-        "colorbar": {"thickness": 14, "title": {"text": name}},
+        "colorbar": {"thickness": 12, "title": {"text": name, "side": "right"}},
         "customdata": [[inside[i, j].as_data() for i in range(len(x))] for j in range(len(y))],
         "hovertemplate": "<b>%{customdata[0]}</b><br>%{customdata[1]}<extra></extra>",
         "hoverongaps": True,
@@ -257,24 +248,60 @@ def _heat(
     }
 
 
-def _line(maps: Maps, values: Array, lower: Array, upper: Array, cells: NDArray[np.object_], name: str) -> Spec:
-    x = maps.views[0]
+def _points(maps: Maps, values: Array, lower: Array, upper: Array, cells: NDArray[np.object_], name: str) -> Spec:
+    """Cells along one axis, with their intervals; what joins them is drawn apart."""
     return {
         "type": "scatter",
-        "mode": "lines+markers" if x.numeric else "markers",
-        "x": places(x).tolist(),
+        "mode": "markers",
+        "x": places(maps.views[0]).tolist(),
         "y": _nullable(values),
         "error_y": {
-            "type": "data", "symmetric": False, "thickness": 1.2, "width": 3,
+            "type": "data", "symmetric": False, "thickness": 1.2, "width": 3, "color": MARKS,
             "array": np.nan_to_num(upper - values).tolist(), "arrayminus": np.nan_to_num(values - lower).tolist(),
         },
-        "line": {"color": BLUE},
-        "marker": {"size": 8},
+        "marker": {"size": 8, "color": MARKS},
         "customdata": [cell.as_data() for cell in cells],
         "hovertemplate": "<b>%{customdata[0]}</b><br>%{customdata[1]}<extra></extra>",
         "name": name,
         "showlegend": False,
     }  # fmt: skip
+
+
+def _joined(maps: Maps, variant: VariantMap) -> list[Spec]:
+    """Lines between neighbouring cells: faint and dashed where what lies between is not known."""
+    view, values = maps.views[0], variant.success_rate
+    if not view.numeric:
+        return []
+    known = known_between(view, variant.lower, variant.upper)
+    traces = []
+    for which, style in (
+        (known, {"color": MARKS, "width": 2}),
+        (~known, {"color": FAINT, "width": 1, "dash": "dash"}),
+    ):
+        at = pieces(values, which)
+        x, y = (np.where(at < 0, np.nan, each[at]) for each in (places(view), values))
+        traces.append(
+            {"type": "scatter", "mode": "lines", "x": _nullable(x), "y": _nullable(y), "line": style,
+             "hoverinfo": "skip", "showlegend": False, "name": "between cells"}
+        )  # fmt: skip
+    return [trace for trace in traces if trace["x"]]
+
+
+def _not_flown(maps: Maps, values: Array, name: str) -> list[Spec]:
+    """Hatching over cells without a number, as no colour of a scale is hatched."""
+    if not np.isnan(values).any():
+        return []
+    x, y = (borders(view) for view in maps.views[:2])
+    corners: list[tuple[float | None, float | None]] = []
+    for i, j in zip(*np.nonzero(np.isnan(values)), strict=True):
+        (left, right), (low, high) = x[i : i + 2].tolist(), y[j : j + 2].tolist()
+        corners += [(left, low), (right, low), (right, high), (left, high), (left, low), (None, None)]
+    return [
+        {"type": "scatter", "mode": "lines", "x": [x for x, _ in corners], "y": [y for _, y in corners],
+         "line": {"width": 0}, "fill": "toself",
+         "fillpattern": {"shape": "/", "size": 7, "solidity": 0.2, "fgcolor": GREY_LINE, "bgcolor": GROUND},
+         "hoverinfo": "skip", "name": name, "showlegend": True}
+    ]  # fmt: skip
 
 
 def _curve(maps: Maps, lines: Sequence[Array], name: str, style: Spec) -> list[Spec]:
@@ -310,7 +337,9 @@ def _bars(maps: Maps, crossed: Crossings, name: str) -> list[Spec]:
             {
                 "type": "scatter", "mode": "markers",
                 "x": at[:, 0].round(5).tolist(), "y": at[:, 1].round(5).tolist(),
-                "marker": {"color": BLACK, "size": 3}, "error_x" if axis == 0 else "error_y": bar,
+                # Where in between coarse cells it is, nobody has seen.
+                "marker": {"color": "rgba(0,0,0,0)" if coarse(view) else BLACK, "size": 3},
+                "error_x" if axis == 0 else "error_y": bar,
                 "hoverinfo": "skip", "name": f"interval of {name}", "showlegend": False,
             }
         )  # fmt: skip
@@ -328,18 +357,18 @@ def _nullable(values: Array) -> list[Any]:
 def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | None = None) -> Spec:
     axes = [_axis(view) for view in views]
     if len(axes) == 1:
-        axes.append({"title": {"text": title}, "range": list(ends or (0.0, 1.0)), "gridcolor": "#e4e4e4"})
+        axes.append({"title": {"text": title}, "range": list(ends or (0.0, 1.0)), "zeroline": False})
     return {
         "xaxis": axes[0],
         "yaxis": axes[1],
         "height": HEIGHT,
         "margin": {"l": 60, "r": 10, "t": 30, "b": 50},
-        "plot_bgcolor": "#d9d9d9" if len(views) == 2 else "white",
+        "plot_bgcolor": GROUND if len(views) == 2 else "white",
         "paper_bgcolor": "white",
         "font": {"family": "system-ui, sans-serif", "size": 12},
         "hovermode": "closest",
         "hoverlabel": {"align": "left", "bgcolor": "white", "font": {"color": BLACK}, "bordercolor": GREY_LINE},
-        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
+        "legend": {"orientation": "h", "x": 0, "y": -0.28, "yanchor": "top"},
         "dragmode": "pan",
         "shapes": [],
     }

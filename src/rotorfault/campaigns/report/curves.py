@@ -48,7 +48,7 @@ class Crossings(NamedTuple):
     points : ndarray, shape (crossings, 2)
         On lines of the grid; where the success rate changes along both axes alike, on both.
     lower, upper : ndarray, shape (crossings,)
-        Interval along the crossing's axis; NaN where it is open.
+        Interval along the crossing's axis, from cell to cell (`to_cells`); NaN where it is open.
     along : ndarray of int, shape (crossings,)
         Axis, 0 or 1, along which it crosses the level: of the two the one on which it changes faster there, so
         that intervals lie across the boundary and not beside it.
@@ -98,13 +98,15 @@ def crossings(maps: Maps, variant: VariantMap, part: Slice, level: float) -> Cro
         if not x.numeric:
             return _nothing(level)
         row = Interval(bounds.lower[None], bounds.upper[None])
-        crossed = boundary(successes[None], flights[None], x.positions, level, axis=1, interval=row)
+        found = boundary(successes[None], flights[None], x.positions, level, axis=1, interval=row)
+        crossed = to_cells(found, x.positions)
         return Crossings(level, [], *_points(crossed, np.array([level]), 0))
     views, rate = maps.views[:2], part.of(variant.success_rate)
     parts = []
     for axis, view in enumerate(views):
         if view.numeric:
-            crossed = boundary(successes, flights, view.positions, level, axis=axis, interval=bounds)
+            found = boundary(successes, flights, view.positions, level, axis=axis, interval=bounds)
+            crossed = to_cells(found, view.positions)
             points, lower, upper, along = _points(crossed, views[1 - axis].positions, axis)
             across = _faster(views, rate, points, axis)
             parts.append((points[across], lower[across], upper[across], along[across]))
@@ -114,6 +116,29 @@ def crossings(maps: Maps, variant: VariantMap, part: Slice, level: float) -> Cro
     x_positions, y_positions = (view.positions for view in views)
     lines = _contours(x_positions, y_positions, rate, level) if to_scale else []
     return Crossings(level, lines, *(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def to_cells(crossed: Boundary, positions: Array) -> Boundary:
+    """The same crossings with intervals that reach to cells.
+
+    A cell's interval holds at the cell. Between two cells nothing was flown, and that bounds go straight from one to
+    the next is no more than a way to draw them: the crossing may lie anywhere between the last cell that is surely
+    on one side of the level and the first that is surely on the other.
+
+    Parameters
+    ----------
+    crossed : Boundary
+    positions : ndarray, shape (cells,)
+        Of the cells, ascending.
+    """
+    slack = 1e-9 * (positions[-1] - positions[0])  # for ends that are cells but for rounding
+    below = np.searchsorted(positions, crossed.lower + slack, side="right") - 1
+    above = np.searchsorted(positions, crossed.upper - slack, side="left")
+    last = len(positions) - 1
+    return crossed._replace(
+        lower=np.where(np.isnan(crossed.lower), np.nan, positions[below.clip(0, last)]),
+        upper=np.where(np.isnan(crossed.upper), np.nan, positions[above.clip(0, last)]),
+    )
 
 
 def _faster(views: tuple[View, ...], rate: Array, points: Array, axis: int) -> NDArray[np.bool_]:

@@ -9,10 +9,20 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
-from rotorfault.campaigns.report.axis_drawing import label, legend_columns, places, scale_x
+from rotorfault.campaigns.report.axis_drawing import (
+    coarse,
+    known_between,
+    label,
+    legend_columns,
+    pieces,
+    places,
+    scale_x,
+)
 from rotorfault.campaigns.report.curves import LEVELS, Slice, crossings, edges
 from rotorfault.campaigns.report.maps import Maps
+from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLACK, COLOURS, GREY, LINES, new_figure, shown
 
 LINE = Slice("", (slice(None),))
@@ -20,10 +30,28 @@ LINE = Slice("", (slice(None),))
 WITH_YAW: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.2}
 WITHOUT_YAW: dict[str, Any] = {"color": BLACK, "linestyle": (0, (2.4, 1.2)), "linewidth": 1.2}
 
+FAINT: dict[str, Any] = {"linestyle": (0, (4.0, 3.0)), "linewidth": 0.6, "alpha": 0.6}
+
 
 def look(k: int) -> dict[str, Any]:
     """Colour and kind of line of the k-th variant."""
     return {"color": COLOURS[k % len(COLOURS)], "linestyle": LINES[k // len(COLOURS) % len(LINES)]}
+
+
+def join(axes: Axes, at: Array, values: Array, known: NDArray[np.bool_], style: dict[str, Any]) -> None:
+    """Lines between the marks of neighbouring cells: faint and dashed where what lies between is not known.
+
+    Parameters
+    ----------
+    axes : Axes
+    at, values : ndarray, shape (cells,)
+    known : ndarray of bool, shape (cells - 1,)
+    style : dict
+        Of the line where it is known.
+    """
+    for which, look_of in ((known, style), (~known, {**FAINT, "color": style["color"]})):
+        cells = pieces(values, which)
+        axes.plot(*(np.where(cells < 0, np.nan, each[cells]) for each in (at, values)), **look_of)
 
 
 def success_lines(maps: Maps) -> Figure:
@@ -36,8 +64,11 @@ def success_lines(maps: Maps) -> Figure:
     beside = _beside(maps)
     for k, variant in enumerate(maps.variants):
         style = look(k)
-        line = style if x.numeric else {**style, "linestyle": "none"}
-        above.plot(at, variant.success_rate, marker="o", markersize=3.0, **line)
+        marks = {**style, "linestyle": "none", "marker": "o", "markersize": 3.0}
+        if x.numeric:
+            known = known_between(x, variant.lower, variant.upper)
+            join(above, at, variant.success_rate, known, style)
+        above.plot(at, variant.success_rate, **marks)
         reach = [variant.success_rate - variant.lower, variant.upper - variant.success_rate]
         above.errorbar(
             at + beside[k],
@@ -47,7 +78,7 @@ def success_lines(maps: Maps) -> Figure:
             ecolor=style["color"],
             elinewidth=0.7,
         )
-        below.plot(at, np.where(variant.flights > 0, variant.flights, np.nan), marker="o", markersize=3.0, **line)
+        below.plot(at, np.where(variant.flights > 0, variant.flights, np.nan), **marks)
         handles[shown(variant.label, 30)] = Line2D([], [], marker="o", markersize=3.0, **style)
         for level in LEVELS:
             _crossing(above, maps, k, level)
@@ -106,9 +137,9 @@ def _crossing(axes: Axes, maps: Maps, k: int, level: float) -> None:
         ends = [x.coordinates(np.array([point if np.isnan(end) else end]))[0] for end in (lower, upper)]
         colour = look(k)["color"]
         axes.plot(ends, [level, level], color=colour, linewidth=2.4, alpha=0.45, solid_capstyle="butt")
-        axes.plot(
-            x.coordinates(np.array([point])), [level], color=colour, marker="|", markersize=7.0, markeredgewidth=1.4
-        )
+        if not coarse(x):  # else where between two cells it is, nobody has seen
+            at = x.coordinates(np.array([point]))
+            axes.plot(at, [level], color=colour, marker="|", markersize=7.0, markeredgewidth=1.4)
 
 
 def _limits(axes: Axes, maps: Maps, handles: dict[str, Artist]) -> None:

@@ -11,13 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 
 from rotorfault.campaigns.report.axis_drawing import (
     DIFFERENCE_COLOURS,
     FLIGHTS_COLOURS,
     SUCCESS_COLOURS,
     borders,
+    coarse,
     colours,
     columns,
     label,
@@ -39,6 +40,8 @@ WITH_YAW: dict[str, Any] = {"color": VERMILION, "linestyle": "-", "linewidth": 1
 WITHOUT_YAW: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (2.4, 1.2)), "linewidth": 1.2}
 DOTS: dict[str, Any] = {"color": BLACK, "marker": "o", "markersize": 2.4, "linestyle": "none"}
 EMPTY = "0.85"
+NOT_FLOWN: dict[str, Any] = {"facecolor": EMPTY, "edgecolor": "0.6", "linewidth": 0.0, "hatch": "/////"}
+GUESS: dict[str, Any] = {"color": "0.35", "linestyle": (0, (4.0, 3.0)), "linewidth": 0.6}  # between coarse cells
 
 
 class MapPanel(NamedTuple):
@@ -62,7 +65,9 @@ def success_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Fig
         flown = np.where(flights > 0, flights, np.nan)
         meshes["flights"] = _mesh(below, maps, flown, FLIGHTS_COLOURS, (0.0, float(most)))
         if np.isnan(rate).any():
-            handles["no flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
+            handles["not flown"] = Patch(**NOT_FLOWN)
+        if not np.nan_to_num(rate).any():
+            handles["no flight was successful"] = Patch(facecolor=SUCCESS_COLOURS[0])
         _limits(axes, maps, panel, handles)
         for level in LEVELS:
             _boundary(axes, maps, crossings(maps, variant, panel.part, level), handles)
@@ -88,7 +93,7 @@ def difference_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> 
         axes.plot(x[i], y[j], **DOTS)
         dotted |= bool(len(i))
         if np.isnan(difference).any():
-            handles["no common flights"] = Patch(facecolor=EMPTY, edgecolor="0.6", linewidth=0.4)
+            handles["no common flights"] = Patch(**NOT_FLOWN)
     level = f"p < {100.0 * (1.0 - maps.study.refine.level):.3g} % after Holm's correction"
     if dotted:
         handles[f"significant: {level}"] = Line2D([], [], **DOTS)
@@ -143,8 +148,10 @@ def _title(maps: Maps, panels: Sequence[MapPanel], title: str) -> str:
 
 
 def _mesh(axes: Axes, maps: Maps, values: Array, chosen: Sequence[str], limits: tuple[float, float]) -> QuadMesh:
-    axes.set_facecolor(EMPTY)
     x, y = (borders(view) for view in maps.views[:2])
+    if np.isnan(values).any():
+        ground = Rectangle((x[0], y[0]), x[-1] - x[0], y[-1] - y[0], zorder=0.5, **NOT_FLOWN)
+        axes.add_patch(ground)
     return axes.pcolormesh(
         x, y, np.ma.masked_invalid(values.T), cmap=colours("map", chosen), vmin=limits[0], vmax=limits[1],
         rasterized=values.size > 2000,
@@ -170,8 +177,13 @@ def _bars(
 def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Artist]) -> None:
     style = LEVEL_LINES[crossed.level]
     x, y = maps.views[:2]
+    guessed = coarse(x) or coarse(y)
     for line in crossed.lines:
-        _line(axes, x.coordinates(line[:, 0]), y.coordinates(line[:, 1]), style, 3.0)
+        along = x.coordinates(line[:, 0]), y.coordinates(line[:, 1])
+        if guessed:
+            axes.plot(*along, zorder=3.1, **GUESS)
+        else:
+            _line(axes, *along, style, 3.0)
     if not len(crossed.points):
         return
     at = np.column_stack([x.coordinates(crossed.points[:, 0]), y.coordinates(crossed.points[:, 1])])
@@ -187,7 +199,9 @@ def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Art
             at[which, 0], at[which, 1], xerr=bar if axis == 0 else None, yerr=bar if axis == 1 else None, fmt="none",
             ecolor=style["color"], elinewidth=0.8, capsize=1.6, capthick=0.8, zorder=3.2,
         )  # fmt: skip
-    if not crossed.lines:  # crossings of lines that are no neighbours
+    if guessed:
+        style = GUESS
+    elif not crossed.lines:  # crossings of lines that are no neighbours
         style = {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 3.0, "zorder": 3.3}
         style["markerfacecolor"] = BLACK if crossed.level == LEVELS[0] else "white"
         axes.plot(at[:, 0], at[:, 1], **style)

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import base64
 import json
-import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from rotorfault.campaigns import grades
 from rotorfault.campaigns.report import charts
-from rotorfault.campaigns.report.charts import signed
+from rotorfault.campaigns.report.answer import answer
+from rotorfault.campaigns.report.axis_drawing import coarse
 from rotorfault.campaigns.report.curves import slices
-from rotorfault.campaigns.report.maps import Maps
-from rotorfault.campaigns.sampling.paired import Difference
+from rotorfault.campaigns.report.flown import flown, quoted
+from rotorfault.campaigns.report.maps import Maps, VariantMap
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.loop.scores import RECOVERED
+from rotorfault.report.page_style import environment
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 MEANINGS = {
@@ -54,7 +54,6 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         SVG files to be shown: ``grades`` and ``recovery``.
     """
     template = (resources.files("rotorfault.campaigns.report") / "campaign.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     cells = [charts.variant_cells(maps, k, folder) for k in range(len(maps.variants))]
     sections = _sections(maps, folder, cells)
     rows = [
@@ -62,28 +61,22 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         for variant, notes in zip(maps.variants, cells, strict=True)
         for at in np.ndindex(*variant.cell.shape)
     ]
-    return environment.from_string(template).render(
+    return environment().from_string(template).render(
         study=maps.study,
         maps=maps,
-        seeds=f"{maps.study.seed}; a flight's draws and seed follow from it, its cell and its number within the cell",
-        versions=versions,
+        answer=answer(maps),
+        flown=flown(maps, folder, versions),
         meanings=MEANINGS,
         recovered=f"{RECOVERED:g}",
-        axes=[_axis(maps, k) for k in range(len(maps.views))],
-        totals=[_total(maps, k) for k in range(len(maps.variants))],
-        differences=[
-            {"pair": f"{pair.first} less {pair.second}", "difference": _interval(pair.total, signed),
-             "significant": int(pair.significant.sum())}
-            for pair in maps.pairings
-        ],
+        possible=[_possible(variant) for variant in maps.variants],
+        coarse=any(coarse(view) for view in maps.views[:2]),
         sections=[{k: v for k, v in section.items() if k != "spec"} for section in sections],
         specs=_script([section["spec"] for section in sections]),
         slices=slices(maps),
-        level=f"{100.0 * maps.study.refine.level:.4g} %",
         error=f"{100.0 * (1.0 - maps.study.refine.level):.3g} %",
         rows=rows[:MOST_ROWS],
         cut=len(rows) - MOST_ROWS if len(rows) > MOST_ROWS else 0,
-        folder=shlex.quote(str(folder)),
+        folder=quoted(folder),
         figures={name: base64.b64encode(path.read_bytes()).decode("ascii") for name, path in figures.items()},
         plotly=Markup(get_plotlyjs()),
     )  # fmt: skip
@@ -115,41 +108,18 @@ def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, A
     return {"kind": kind, "title": f"{title}: {part}" if part else title, "spec": spec}
 
 
-def _axis(maps: Maps, k: int) -> str:
-    view = maps.views[k]
-    ends = f"{view.text(0)} to {view.text(len(view.values) - 1)}" if view.numeric else ", ".join(
-        view.text(i) for i in range(len(view.values))
-    )  # fmt: skip
-    unit = f" {view.unit}" if view.unit not in ("", "1") else ""
-    return f"{view.title}: {ends}{unit}, {len(view.values)} values"
-
-
-def _total(maps: Maps, k: int) -> dict[str, Any]:
-    variant = maps.variants[k]
-    held = free = "not known"
-    if variant.possible is not None:
-        held, free = (_cells(each) for each in variant.possible)
-    return {
-        "variant": variant.label,
-        "flights": int(variant.flights.sum()),
-        "cells": int((variant.flights > 0).sum()),
-        "success": _interval(variant.total, lambda share: f"{100.0 * share:.1f} %"),
-        "held": held,
-        "free": free,
-    }
+def _possible(variant: VariantMap) -> tuple[str, str]:
+    """In how many cells hover is possible, with yaw held and with yaw given up."""
+    if variant.possible is None:
+        return "not known", "not known"
+    held, free = (_cells(each) for each in variant.possible)
+    return held, free
 
 
 def _cells(possible: Array) -> str:
     """In how many cells hover is possible."""
     depends = int(np.isnan(possible).sum())
     return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")
-
-
-def _interval(difference: Difference, text: Callable[[float], str]) -> str:
-    estimate, lower, upper = (float(each) for each in difference)
-    if np.isnan(estimate):
-        return "–"
-    return f"{text(estimate)} ({text(max(lower, -1.0))} to {text(min(upper, 1.0))})"
 
 
 def _script(data: object) -> Markup:

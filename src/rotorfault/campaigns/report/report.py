@@ -11,10 +11,11 @@ from rotorfault.base.files import write_atomically
 from rotorfault.campaigns.report.figures import draw
 from rotorfault.campaigns.report.maps import maps
 from rotorfault.campaigns.report.page import render
+from rotorfault.campaigns.store.folder import PAGE
 from rotorfault.campaigns.study import Study
 from rotorfault.report.figures import save
 
-FIGURES, PAGE = "figures", "report.html"
+FIGURES = "figures"
 
 
 def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, str]) -> list[Path]:
@@ -28,7 +29,7 @@ def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, st
     folder : Path
         Of the campaign.
     versions : mapping of str to str
-        With which it was flown.
+        With which it was flown; under ``source`` the digest of the program's source.
 
     Returns
     -------

@@ -12,6 +12,7 @@ from rotorfault.campaigns.store.identity import Identity, read_identity
 from rotorfault.campaigns.store.parquet import DamagedError
 
 STUDY, PARTS, DAMAGED, LOCK, FLIGHTS = "study.json", "parts", "damaged", "lock", "flights.parquet"
+PAGE = "report.html"
 
 
 def require_vacant(folder: Path, campaign: Identity) -> None:
