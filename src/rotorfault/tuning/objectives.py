@@ -48,10 +48,10 @@ COST_WEIGHT = 0.3
 TILT_FREE = 1.1  # rad; the largest demand that a search may allow, see `cascade.tilt_max` in the search space
 # Per decade of (rad/s^2)^2: settles between flights that are alike in all else, in favour of the quieter one.
 EFFORT_WEIGHT = 0.04
-# Of the change of commands in a sampling period, as a share of hover thrust: up to half of what `fly` calls rattling
-# (`rotorfault.loop.scores.RATTLING`) is free, so that a flight with more noise than those searched on stays below it.
-QUIET_FREE = 0.5 * RATTLING
-QUIET_WEIGHT = 1.0  # s per percent beyond
+# Of the change of commands in a sampling period, as a share of hover thrust: up to three quarters of what `fly` calls
+# rattling (`rotorfault.loop.scores.RATTLING`) are free, so that a flight noisier than those searched on stays below.
+QUIET_FREE = 0.75 * RATTLING
+QUIET_WEIGHT = 5.0  # s per percent beyond: two percent too much are as bad as a lost flight, so that it is a limit
 # Per span of a reference that moves, where `TRACKING_WEIGHT` has none: a tenth of the span behind it counts as 1 s.
 TRACKING_SHARE = 10.0
 MISSED = 0.05  # loss from which on a rotor that no flag names at the end is missed; the diagnosis finds 0.1
@@ -73,8 +73,8 @@ WEIGHTS: tuple[tuple[str, float, str, str], ...] = (
      "ten times the cost must save 0.3 s; a quarter of what a tuned flight comes to"),
     ("rotor flagged wrongly, or missed", 1.0, "s", "as bad as settling a second later"),
     ("tilt beyond 1.1 rad", 1.0, "s/rad", "the largest tilt that may be demanded: more is a flight near its limit"),
-    ("change of commands beyond 1 % of hover thrust in a sampling period (`quiet` alone)", QUIET_WEIGHT, "s per %",
-     "half of what counts as rattling is free; each percent beyond costs as much as settling a second later"),
+    ("change of commands beyond 1.5 % of hover thrust in a sampling period (`quiet` alone)", QUIET_WEIGHT, "s per %",
+     "three quarters of what counts as rattling are free; two percent too much are as bad as a lost flight"),
     ("effort, on log10(1 + mean square angular acceleration)", EFFORT_WEIGHT, "s per decade",
      "settles between flights alike in all else, for the quieter one"),
 )  # fmt: skip
