@@ -9,6 +9,7 @@ changes nothing in them; `rotorfault.analysis.hover` says whether hover is still
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,8 +24,8 @@ from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.bounds import positive, require
+from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
-from rotorfault.base.foreign import is_place
 from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.maths.arrays import ANGLES
@@ -35,8 +36,9 @@ from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import part_from
-from rotorfault.scenario.scenario import substeps_of
+from rotorfault.scenario.scenario import named_places, substeps_of
 from rotorfault.scenario.slots import SLOTS
 
 __all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings", "trim_report"]
@@ -143,6 +145,8 @@ def trim_report(
     preset: str | None = None,
     period: float = 0.001,
     loss: PerRotor | None = None,
+    *,
+    settings: Mapping[str, Any] | None = None,
 ) -> TrimReport:
     """Hover, what of it losses leave, closed-loop poles, gain and delay margins, and warnings.
 
@@ -157,12 +161,15 @@ def trim_report(
         Sampling period.
     loss : PerRotor, optional
         Of the rotors, 0 to 1, for `TrimReport.attainable`; all else is with sound rotors.
+    settings : mapping, optional
+        Dotted keys and values of the controller (``controller.cascade.tilt_max``) and of a vehicle that is given by
+        name, path or file (``vehicle.mass.value``), over what they have.
 
     Raises
     ------
     InputError
-        If the period is not above 0 and up to 0.1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
-        preset.
+        If the period is not above 0 and up to 0.1 s, a loss not in 0 to 1, there is no such vehicle, controller or
+        preset, or a setting is of none of them.
     """
     require(vehicle, (Vehicle, VehicleFile, str, Path), "vehicle", "a name, a path that ends in .toml, or a Vehicle")
     if loss is not None:
@@ -170,14 +177,21 @@ def trim_report(
     period = positive(period, "period", "s", LONGEST_PERIOD)
     if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
         raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
+    mine, its = _shared_out(settings, isinstance(controller, str), not isinstance(vehicle, Vehicle))
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
+    if isinstance(vehicle, VehicleFile) and its:
+        tables: dict[str, Any] = {"vehicle": vehicle.model_dump(mode="json")}
+        override_all(tables, its)
+        vehicle = validate(VehicleFile, tables["vehicle"], f"vehicle '{vehicle.name}' with its settings")
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
     if isinstance(controller, str):
-        table = {"kind": controller} | ({} if preset is None else {"preset": preset})
+        named: dict[str, Any] = {"controller": {"kind": controller} | ({} if preset is None else {"preset": preset})}
+        override_all(named, mine)
         # Whoever names code here wants it run.
-        part = part_from(CONTROLLER, table, (controller,) if is_place(controller) else False)
-        block, name = part.make(), controller + ("" if preset is None else f" ({preset})")
+        part = part_from(CONTROLLER, named["controller"], named_places(named))
+        words = ([] if preset is None else [preset]) + [f"{key.partition('.')[2]} = {v}" for key, v in mine.items()]
+        block, name = part.make(), controller + (f" ({', '.join(words)})" if words else "")
     else:
         block, name = as_controller(controller), type(controller).__name__
     warnings = [*vehicle_warnings(numbers), *sampled_data_check(block, numbers, period)]
@@ -190,6 +204,29 @@ def trim_report(
         warnings.append(f"no linearisation: {error}")
     possible = attainable(numbers, loss)
     return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, axis_margins, tuple(warnings))
+
+
+def _shared_out(
+    settings: Mapping[str, Any] | None, for_controller: bool, for_vehicle: bool
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings of the controller, and those of the vehicle; refuses what hover has not got."""
+    require(
+        settings or {}, Mapping, "settings", "dotted keys and values, such as {'controller.cascade.tilt_max': 0.5}"
+    )
+    found: dict[str, dict[str, Any]] = {CONTROLLER.name: {}, "vehicle": {}}
+    possible = {CONTROLLER.name: for_controller, "vehicle": for_vehicle}
+    allowed = "keys below controller. and vehicle., for trim looks at hover in still air with sound rotors"
+    elsewhere = {"controller.kind": "controller", "controller.preset": "preset", "period": "period"}
+    for key, value in (settings or {}).items():
+        first, dot, _ = str(key).partition(".")
+        if key in elsewhere:
+            raise InputError(f"{key}: is no setting here; give it as {elsewhere[key]} (--{elsewhere[key]})")
+        if first not in found or not dot:
+            raise InputError(f"{key}: is no setting of trim; allowed: {allowed}")
+        if not possible[first]:
+            raise InputError(f"{key}: the {first} is an object that is made already; give it by name, or change it")
+        found[first][key] = value
+    return found[CONTROLLER.name], found["vehicle"]
 
 
 def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list[str]:

@@ -15,7 +15,8 @@ from scipy.special import ndtri
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.axes import axis
-from rotorfault.campaigns.study import Draw, Study
+from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.noise import threefry
 
 SEEDS = 10**12

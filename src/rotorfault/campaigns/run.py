@@ -31,7 +31,7 @@ from rotorfault.maths.arrays import Array
 BYTES_PER_FLIGHT = 400
 ROOMS = (
     "campaigns/sampling", "campaigns/axes.py", "campaigns/block.py", "campaigns/flight_set.py", "campaigns/grades.py",
-    "campaigns/rounds.py", "campaigns/study.py",
+    "campaigns/rounds.py", "campaigns/study.py", "campaigns/varied.py",
 )  # fmt: skip
 """Of the campaigns' source, what decides which flights there are and what their rows say."""
 Say = Callable[[str], None]

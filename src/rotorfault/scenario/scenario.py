@@ -306,3 +306,17 @@ def named_places(overrides: Mapping[str, Any]) -> frozenset[str]:
                 yield from places(inner)
 
     return frozenset(places(overrides))
+
+
+def allowed_with(allow: bool | Collection[str], overrides: Mapping[str, Any]) -> bool | Collection[str]:
+    """What code may run where a user has put values in place of a scenario's: what he has named himself, too.
+
+    Parameters
+    ----------
+    allow : bool or collection of str
+        Whether code may run besides, or which.
+    overrides : mapping
+    """
+    if isinstance(allow, bool):
+        return allow or named_places(overrides)
+    return frozenset(allow) | named_places(overrides)

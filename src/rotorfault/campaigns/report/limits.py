@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from rotorfault.analysis.hover import hover_margin
 from rotorfault.campaigns.axes import Columns, columns
-from rotorfault.campaigns.study import Draw, Study
+from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.batch import columns as rows_of
 from rotorfault.flight.assembly import Group, numbers_of
 from rotorfault.flight.sweep import checked_columns, groups_of
