@@ -9,6 +9,7 @@ changes nothing in them; `rotorfault.analysis.hover` says whether hover is still
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +27,8 @@ from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.bounds import positive, require
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.maths.arrays import ANGLES
@@ -61,6 +64,9 @@ class Hover(NamedTuple):
     thrust_margin: float  # greatest total thrust over the one needed; below 1 there is no hover
     torque_max: Vec3  # N m: greatest torque about each body axis, either way, that leaves the thrust as it is
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class TrimReport(NamedTuple):
     """All that is known about a vehicle with a controller in hover; `text` prints it."""
@@ -74,6 +80,23 @@ class TrimReport(NamedTuple):
     linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
     margins: dict[str, Margins]  # per axis of `rotorfault.analysis.linearisation.AXES`; empty without linearisation
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        loop = "no linearisation" if self.linear is None else "stable" if self.linear.stable else "not stable"
+        names = f"{cut(self.vehicle)} with {cut(self.controller)}"
+        return cut(f"<trim of {names} at {self.period:g} s: {loop}, {len(self.warnings)} warning(s)>", LONGEST)
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        """Hover, margins and warnings as tables, for notebooks; `text` has poles and the linearisation too."""
+        title, _, _, *hover_lines = _hover_lines(self)
+        hover_rows = [re.split(r" {2,}", line.strip(), maxsplit=1) for line in hover_lines]
+        parts = [html_table(hover_rows, title=title)]
+        if self.margins:
+            parts.append(html_table(*_margin_table(self)))
+        return "".join([*parts, *(html_note(f"warning: {line}") for line in self.warnings)])
 
     def text(self) -> str:
         """Plain text for a terminal of 100 columns."""
@@ -296,14 +319,21 @@ def _margin_lines(report: TrimReport) -> list[str]:
         return ["Margins: none, the loop has no linearisation"]
     if not report.linear.stable:
         return ["Margins: none, the loop is not stable in hover"]
-    rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
+    rows, header, title = _margin_table(report)
+    return [
+        f"{title}, the others closed (diagnosis off, nominal allocation)",
+        *table_lines([header, *rows], "<>>>>>", 2),
+    ]
+
+
+def _margin_table(report: TrimReport) -> tuple[list[tuple[str, ...]], tuple[str, ...], str]:
+    """Rows, header and title."""
+    header = ("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")
+    rows: list[tuple[str, ...]] = []
     for axis, m in report.margins.items():
         up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
         rows.append((axis, up, down, f"{1e3 * m.delay:.3g}", f"{math.degrees(m.phase):.3g}", f"{m.crossover:.3g}"))
-    return [
-        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
-        *table_lines(rows, "<>>>>>", indent=2),
-    ]
+    return rows, header, "Margins at the plant's input, one axis at a time"
 
 
 def _warning_lines(report: TrimReport) -> list[str]:

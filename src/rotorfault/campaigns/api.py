@@ -7,15 +7,17 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, final
 
-import pyarrow as pa
 import pyarrow.compute as pc
 
 from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError, short
 from rotorfault.base.executors import executor_of
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
 from rotorfault.campaigns.changes import KIND, changed, with_files
+from rotorfault.campaigns.flight_table import FlightTable
 from rotorfault.campaigns.replay import differences, is_changed, replay
 from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.store.store import Store
@@ -58,22 +60,40 @@ class Campaign:
         self.study: Study = study_from(self._store.study, str(self.folder / "study.json"), allow_code)
 
     def __repr__(self) -> str:
-        return f"<campaign {self.study.name} in {self.folder}>"
+        return cut(f"<campaign {cut(self.study.name)} in {self.folder}>", LONGEST)
 
-    def table(self) -> pa.Table:
+    def _repr_html_(self) -> str:
+        """Flights and successes of each variant so far, as a table for notebooks."""
+        table = self._store.table()
+        rows = []
+        for variant in self.study.variant:
+            flown = table.filter(pc.equal(table["variant"], variant.label))
+            first = flown.filter(pc.less(flown["number"], self.study.refine.initial))
+            good = int(pc.sum(first["success"]).as_py() or 0)
+            # Of the first round, as in the report: how many follow is decided by results.
+            rate = f"{good:,} of {first.num_rows:,}" + (
+                f" ({100.0 * good / first.num_rows:.3g} %)" if len(first) else ""
+            )
+            rows.append((variant.label, f"{flown.num_rows:,}", rate))
+        axes = ", ".join(part.name for part in self.study.axis)
+        title = f"campaign {self.study.name}: {self.study.cells:,} cells ({axes})"
+        note = f"{self.study.description or self.study.scenario_name}; in {self.folder}"
+        return html_table(rows, ("variant", "flights", "successes of the first round"), title) + html_note(note)
+
+    def table(self) -> FlightTable:
         """One row per flight that has been flown."""
-        return self._store.table()
+        return FlightTable(self._store.table())
 
     def maps(self) -> Maps:
         """Success rates, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
-        return maps(self.study, self.table())
+        return maps(self.study, self._store.table())
 
     def report(self) -> list[Path]:
         """Write pictures and page; the page's path first."""
         # Loads Matplotlib and Plotly, which a campaign does not need.
         from rotorfault.campaigns.report.report import write
 
-        return write(self.study, self.table(), self.folder, self._store.identity.versions)
+        return write(self.study, self._store.table(), self.folder, self._store.identity.versions)
 
     def replay(
         self, identifier: int, *, controller: str | None = None, settings: Mapping[str, Any] | None = None
@@ -118,7 +138,7 @@ class Campaign:
         flight : Flight
             Flown once more.
         """
-        table = self.table()
+        table = self._store.table()
         rows = table.filter(pc.equal(table["id"], identifier)).to_pylist()
         if not rows:
             return []

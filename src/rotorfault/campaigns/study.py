@@ -21,6 +21,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, as_text, unknown
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.campaigns.grades import GRADES, SUCCESS
 from rotorfault.campaigns.sampling.refine import Refinement
 from rotorfault.campaigns.studies import FOLDER, LONGEST_NAME, NAME, study_names
@@ -104,6 +105,14 @@ class Study(Strict):
                 f"{self.refine.initial} flights in each of {self.cells} cells for each variant",
             )  # fmt: skip
         return self
+
+    def __repr__(self) -> str:
+        axes = ", ".join(part.name for part in self.axis)
+        labels = ", ".join(variant.label for variant in self.variant)
+        text = (
+            f"<study {cut(self.name)} of {cut(self.scenario_name)}: {self.cells:,} cells ({axes}), variants {labels}>"
+        )
+        return cut(text, LONGEST)
 
     @property
     def allows_code(self) -> bool | Collection[str]:

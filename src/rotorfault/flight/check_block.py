@@ -16,6 +16,7 @@ from rotorfault.base.bounds import require
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place, load
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.text_table import table_lines
 from rotorfault.flight.rules import Check, Rules
 from rotorfault.model.block import Block, NoSettings
@@ -51,7 +52,7 @@ class BlockReport:
 
     def __repr__(self) -> str:
         broken = [check.rule for check in self.checks if not check.kept]
-        return f"<{self.part}: {'all rules kept' if not broken else 'broken: ' + ', '.join(broken)}>"
+        return cut(f"<{self.part}: {'all rules kept' if not broken else 'broken: ' + ', '.join(broken)}>", LONGEST)
 
 
 def check_block(

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.analysis.hover import hover_margin
+from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.study import Study
 from rotorfault.campaigns.varied import Draw
@@ -39,6 +40,9 @@ class Limits(NamedTuple):
 
     with_yaw: Array
     without_yaw: Array
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Physics(NamedTuple):
