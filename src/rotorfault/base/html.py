@@ -12,7 +12,9 @@ from collections.abc import Iterable, Sequence
 from rotorfault.base.plain_text import printable
 
 _TABLE = "border-collapse:collapse;font-size:90%;color:inherit;background:transparent;margin:0.3em 0"
-_CELL = "padding:0.15em 0.7em;border:0;border-bottom:1px solid rgba(128,128,128,0.35);background:transparent"
+_CAPTION = "text-align:left;caption-side:top;color:inherit;font-weight:bold;padding:0.2em 0"
+_BORDER = "border:0;border-bottom:1px solid rgba(128,128,128,0.35)"
+_CELL = f"padding:0.15em 0.7em;{_BORDER};background:transparent;white-space:pre-wrap;text-align:left"
 
 
 def html_table(rows: Iterable[Sequence[str]], header: Sequence[str] = (), title: str = "") -> str:
@@ -28,14 +30,14 @@ def html_table(rows: Iterable[Sequence[str]], header: Sequence[str] = (), title:
     """
     parts = []
     if title:
-        parts.append(f"<caption style='text-align:left;caption-side:top;color:inherit'>{_safe(title)}</caption>")
+        parts.append(f"<caption style='{_CAPTION}'>{_safe(title)}</caption>")
     if header:
-        cells = "".join(f"<th scope='col' style='{_CELL};text-align:left'>{_safe(text)}</th>" for text in header)
+        cells = "".join(f"<th scope='col' style='{_CELL}'>{_safe(text)}</th>" for text in header)
         parts.append(f"<thead><tr>{cells}</tr></thead>")
     lines = []
     for first, *others in rows:
-        head = f"<th scope='row' style='{_CELL};text-align:left;font-weight:normal;opacity:0.8'>{_safe(first)}</th>"
-        cells = "".join(f"<td style='{_CELL};text-align:left'>{_safe(text)}</td>" for text in others)
+        head = f"<th scope='row' style='{_CELL};font-weight:normal;opacity:0.8'>{_safe(first)}</th>"
+        cells = "".join(f"<td style='{_CELL}'>{_safe(text)}</td>" for text in others)
         lines.append(f"<tr>{head}{cells}</tr>")
     parts.append(f"<tbody>{''.join(lines)}</tbody>")
     return f"<div style='overflow-x:auto'><table style='{_TABLE}'>{''.join(parts)}</table></div>"
