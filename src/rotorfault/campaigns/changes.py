@@ -66,7 +66,8 @@ def changed(
     tables = study.as_tables()
     named = [with_whole_paths(name) for name in _names(controllers)]
     given = with_files(settings)
-    _require_fixed(study, [*([KIND] if named else []), *given])
+    if keys := [*([KIND] if named else []), *given]:
+        _require_fixed(study, keys)
     if vehicle is not None:
         for variant in tables["variant"]:
             variant["settings"] = {**variant.get("settings", {}), "vehicle": vehicle}

@@ -311,8 +311,9 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
     if as_text(tables.get("scenario", "")).endswith(".toml"):
         tables["scenario"] = str(folder / tables["scenario"])
     variants = tables.get("variant", [])
-    for owner in [tables, *(variants if isinstance(variants, list) else [])]:
-        settings: Any = owner.get("settings") if isinstance(owner, dict) else None
+    owners = [tables, *(variants if isinstance(variants, list) else [])]
+    each: list[Any] = [owner.get("settings") for owner in owners if isinstance(owner, dict)]
+    for settings in [*each, tables.get("overrides")]:
         for key, value in settings.items() if isinstance(settings, dict) else ():
             if is_file(value) or (key == "vehicle" and as_text(value).endswith(".toml")):
                 settings[key] = str(folder / value)
