@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotorfault.base.errors import ControllerWarning, FaultWarning, InputError, ReferenceWarning, VehicleWarning
     from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.flight.check_block import BlockReport, check_block
+    from rotorfault.flight.comparison import Comparison, compare
     from rotorfault.flight.flight import Flight, load
     from rotorfault.flight.fly import fly, fly_all, repeat
     from rotorfault.flight.many import Flights, fly_many
@@ -61,6 +62,7 @@ _HOME = {
     "BlockReport": "flight.check_block",
     "BodyModel": "plant.models",
     "Campaign": "campaigns.api",
+    "Comparison": "flight.comparison",
     "Context": "model.block",
     "ControlInputs": "autopilot.control.protocol",
     "ControlOutput": "autopilot.control.protocol",
@@ -108,6 +110,7 @@ _HOME = {
     "Wrench": "model.signals",
     "campaign": "campaigns.api",
     "check_block": "flight.check_block",
+    "compare": "flight.comparison",
     "critical_loss": "analysis.hover",
     "critical_pair": "analysis.hover",
     "fly": "flight.fly",
@@ -136,6 +139,7 @@ __all__ = [
     "BlockReport",
     "BodyModel",
     "Campaign",
+    "Comparison",
     "Context",
     "ControlInputs",
     "ControlOutput",
@@ -184,6 +188,7 @@ __all__ = [
     "__version__",
     "campaign",
     "check_block",
+    "compare",
     "critical_loss",
     "critical_pair",
     "fly",

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 
 import pytest
 from command_line import run
@@ -97,7 +98,7 @@ def _watched() -> bool:
 def test_a_command_that_swallows_an_interrupt_ends_with_130(
     error: Exception | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def swallow(group: str | None) -> str:
+    def swallow(words: Sequence[str], allow_code: bool) -> str:
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
         if error is not None:

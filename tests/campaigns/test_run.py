@@ -21,12 +21,13 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.executors import InProcess
 from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
+from rotorfault.campaigns.changes import changed
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
 from rotorfault.campaigns.replay import differences, identifier_of
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
-from rotorfault.campaigns.study import Study, changed, load_study, study_from
+from rotorfault.campaigns.study import Study, load_study, study_from
 from rotorfault.scenario.library import load_scenario
 
 pytestmark = needs_simd
@@ -280,7 +281,7 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(tables: dict[str,
 @pytest.mark.parametrize("name", study_names())
 @pytest.mark.parametrize("vehicle", [None, "crazyflie-2.1", "hummingbird"])
 def test_built_in_studies_can_be_flown(name: str, vehicle: str | None) -> None:
-    study = changed(load_study(name), vehicle, None if vehicle is None else "gentle")
+    study = changed(load_study(name), vehicle=vehicle, preset=None if vehicle is None else "gentle")
     run.check(study)
     flights = FlightSet(np.array([0, 1]), np.array([1, 1]), np.array([0, 0]))
     short = study_from(study.as_tables() | {"settings": {**study.settings, "duration": 1.2}}, "test")

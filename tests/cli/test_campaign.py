@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import assert_refused, run, started
 from gates import needs_simd
+from places import EXAMPLES
 
 pytestmark = needs_simd
 STUDY = """
@@ -111,6 +112,10 @@ def test_a_replay_writes_the_whole_flight(folder: Path) -> None:
         (["campaign", "tiny.toml", "--preset", "tund", "--out", "new"], "did you mean 'tuned'"),
         (["campaign", "tiny.toml", "--resume", "--out", "nowhere"], "no such folder"),
         (["campaign", "tiny.toml", "--seed", "5", "--resume"], "seed"),
+        (["campaign", "tiny.toml", "--controller", "smk"], "did you mean 'smc'"),
+        (["campaign", "tiny.toml", "--set", "fault.0.loss=0.2"], "the study varies it, by its axis or draw 'loss'"),
+        (["campaign", "--report-only", "--out", "campaigns/tiny", "--set", "duration=1"], "give it alone"),
+        (["replay", "campaigns/tiny", "--flight", "1", "--set", "nope=1"], "nope"),
         (["replay", "nowhere", "--flight", "1"], "no such folder"),
         (["replay", "campaigns/tiny"], "give the flight by --flight ID, or by --cell and --variant"),
         (["replay", "campaigns/tiny", "--flight", "99999999"], "there is no flight 99999999"),
@@ -125,6 +130,34 @@ def test_a_replay_writes_the_whole_flight(folder: Path) -> None:
 def test_bad_input_is_one_clear_line(folder: Path, arguments: list[str], message: str) -> None:
     assert_refused(run(*arguments, cwd=folder), message)
     assert not (folder / "new").exists()
+
+
+OWN = f"{EXAMPLES / 'controller.py'}:PdController"
+
+
+def test_controllers_of_ones_own_are_compared_resumed_reported_and_replayed(folder: Path) -> None:
+    own = ("campaign", "tiny.toml", "--controller", "smc", "--controller", OWN, "--set", "duration=0.4")
+    for more in ((), ("--resume",)):
+        done = run(*own, "--no-report", *more, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert "PdController" in done.stderr
+    here = folder / "campaigns" / "tiny-smc-PdController"
+    table = pq.read_table(here / "flights.parquet")
+    assert set(table["variant"].to_pylist()) == {"smc", "PdController"}
+    assert max(table["end_time"].to_pylist()) == pytest.approx(0.4)
+    report = ("campaign", "--report-only", "--out", str(here))
+    assert_refused(run(*report), "allow it with --allow-code")
+    assert run(*report, "--controller", OWN).returncode == 0
+    flight = ("replay", str(here), "--cell", "1", "--variant", "PdController", "--no-figures")
+    assert_refused(run(*flight), "allow it with --allow-code")
+    for allowed in (("--allow-code",), ("--controller", OWN)):
+        done = run(*flight, *allowed)
+        assert done.returncode == 0, done.stderr
+        assert "its numbers are those of the campaign's table" in done.stdout
+    done = run(*flight, "--controller", "sdre", "--set", "wind.kind=none")
+    assert done.returncode == 0, done.stderr
+    assert "not the flight of the table, but with controller.kind = 'sdre', wind.kind = 'none'" in done.stdout
+    assert "flown by sdre" in done.stdout
 
 
 def test_no_scheduler_is_one_clear_line(folder: Path) -> None:

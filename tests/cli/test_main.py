@@ -96,7 +96,7 @@ def test_figures_are_written(tmp_path: Path) -> None:
     assert expected | {"flight.nc", "summary.json"} <= names
 
 
-@pytest.mark.parametrize("what", ["vehicle", "scenario"])
+@pytest.mark.parametrize("what", ["vehicle", "scenario", "study"])
 def test_new_file_works_as_it_stands(what: str, tmp_path: Path) -> None:
     done = run("new", what, "mine", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr

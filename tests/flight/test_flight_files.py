@@ -13,7 +13,6 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.cli import catalogue
-from rotorfault.flight import comparison
 from rotorfault.loop.recorded import LoopSignals
 from rotorfault.results.dataset import OLD_FORMAT
 
@@ -127,7 +126,7 @@ def former(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rf.Flight(data, flight.outcome, flight.scores).save(tmp_path_factory.mktemp("former") / "flight.nc")
 
 
-@pytest.mark.parametrize("reader", [rf.load, catalogue.check, lambda path: comparison.labelled([path, path])])
+@pytest.mark.parametrize("reader", [rf.load, catalogue.check, lambda path: rf.compare([path, path])])
 def test_a_file_of_the_former_format_is_refused_in_one_line(former: Path, reader: Any) -> None:
     with pytest.raises(rf.InputError, match=r"flight\.nc: was written by version 0\.1\.0 .*fly --repeat") as caught:
         reader(former)

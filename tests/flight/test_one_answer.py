@@ -128,25 +128,25 @@ def test_files(flown: dict[str, rf.Flight], name: str, tmp_path: Path) -> None:
     assert_same(rf.repeat(tmp_path / "flight.nc").scores, flown[name].scores)
 
 
-def test_compare(flown: dict[str, rf.Flight], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_compare(flown: dict[str, rf.Flight], tmp_path: Path) -> None:
     """The table of `compare` has the numbers of the summaries, whatever was recorded."""
     files = []
     for name in SCENARIOS:
         (tmp_path / name).mkdir()
         files.append(rf.fly(scenario(name, 11 - SELDOM[name])).save(tmp_path / name / "flight.nc"))
-    loaded = comparison.labelled(files)
+    compared = rf.compare(files)
+    loaded = compared.flights
     assert len(loaded) == len(files)
     for flight, wanted in zip(loaded.values(), flown.values(), strict=True):
         assert_same(flight.scores, wanted.scores)
         assert flight.outcome == wanted.outcome
-    header, *lines = comparison.comparison({label: flight.summary() for label, flight in loaded.items()})
+    header, *lines = compared.rows()
     assert header == ["", *loaded]
     for column, name in enumerate(SCENARIOS, start=1):
         wanted = dict(rows(flown[name].summary()))
         for line in lines:
             assert line[column].removesuffix(f" {UNTIL_LOST}") == wanted.get(line[0], "-"), (name, line[0])
-    comparison.print_table(loaded)
-    assert "of a flight that was lost" in capsys.readouterr().out
+    assert "of a flight that was lost" in str(compared)
 
 
 ENGINES = [name for name in ("simd", "numpy") if name != "simd" or have_simd()]

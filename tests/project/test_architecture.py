@@ -31,9 +31,22 @@ LAZY = {
     "rotorfault.bench.study": {"rotorfault.bench.accuracy_figure": MATPLOTLIB},
     "rotorfault.campaigns.api": {"rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load"},
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
+    "rotorfault.base.frames": {
+        "pandas": "need not be there, and takes long to load",
+        "polars": "takes longer to load than a table to make",
+        "pyarrow": "the same",
+    },
+    "rotorfault.campaigns.flight_table": {"polars": "takes longer to load than a table to make"},
     "rotorfault.cli.catalogue": {
+        "rotorfault.campaigns.run": "is needed to check a study, and for no list",
+        "rotorfault.campaigns.study": "the same",
+        "rotorfault.flight.reference_rows": "the same",
         "rotorfault.flight.assembly": "is needed to check a scenario, and for no list",
         "rotorfault.results.dataset": "xarray takes longer to load than a file to check",
+    },
+    "rotorfault.cli.details": {
+        "rotorfault.campaigns.axes": "is needed for studies and what they vary alone",
+        "rotorfault.campaigns.study": "the same, and its statistics take long to load",
     },
     "rotorfault.engine": {
         "rotorfault.engine.arrays": "one engine flies, the others need not load",
@@ -41,6 +54,7 @@ LAZY = {
         "rotorfault.engine.simd": "llvmlite need not be installed",
     },
     "rotorfault.engine.taylor": {"heyoka": OPTIONAL},
+    "rotorfault.flight.comparison": {"rotorfault.report.figures": MATPLOTLIB},
     "rotorfault.flight.doubts": {
         "rotorfault.analysis.trim": "brings scipy, which takes longer to load than a flight to fly"
     },

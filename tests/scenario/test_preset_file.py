@@ -8,7 +8,8 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.autopilot.control import CONTROLLER
-from rotorfault.campaigns.study import study_from
+from rotorfault.campaigns.changes import changed
+from rotorfault.campaigns.study import load_study, study_from
 from rotorfault.scenario.library import load_scenario
 
 PRESET = """
@@ -121,3 +122,15 @@ def test_a_study_keeps_the_gains_themselves(file: Path) -> None:
     varied = {**tables, "axis": [{"name": "preset", "values": ["tuned", str(file)]}], "variant": [{"label": "a"}]}
     with pytest.raises(rf.InputError, match="preset files cannot be varied; give each to a variant"):
         study_from(varied, "own")
+
+
+def test_a_campaign_gives_each_controller_the_presets_that_are_for_it(file: Path, tmp_path: Path) -> None:
+    study = load_study("partial-loss-map")
+    given = changed(study, controllers=["roismc", "smc"], preset=str(file))
+    assert [scenario[CONTROLLER].preset_label for scenario in given.scenarios] == ["mine", "tuned"]
+    with pytest.raises(rf.InputError, match=r"is one of controller 'roismc'; the study flies smc"):
+        changed(study, controllers="smc", preset=str(file))
+    other = tmp_path / "other.toml"
+    other.write_text("[other.cascade]\ntilt_max = 0.3\n")
+    both = changed(study, controllers=["roismc", "smc"], preset=[str(other), str(file)])
+    assert [scenario[CONTROLLER].preset_label for scenario in both.scenarios] == ["mine", "other"]

@@ -34,6 +34,7 @@ from numpy.typing import ArrayLike
 
 from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
@@ -75,6 +76,9 @@ class HoverMargin(NamedTuple):
     without_yaw: Scalar  # 1/0, forces and tilt torques in balance
     spinning: Scalar  # 1/0, enough thrust on average: necessary, not sufficient
     yaw_torque: Scalar  # N m, what is left over of it at least without yaw, body z axis; NaN if without_yaw is 0
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Attainable(NamedTuple):
@@ -322,16 +326,12 @@ def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
     critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", "1", "2", "3", "4")]
     for name, losses in (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw)):
         critical.append((name, *("none" if math.isnan(x) else f"{x:.4f}" for x in losses)))
-    left_over = []
-    if m.without_yaw and not m.with_yaw:
-        turn = m.yaw_torque / vehicle.inertia.z
-        left_over = [
-            f"  yaw torque left over  {m.yaw_torque:.3g} N m, which turns the body faster by {turn:.3g} rad/s^2"
-        ]
+    turn = f"which turns the body faster by {m.yaw_torque / vehicle.inertia.z:.3g} rad/s^2"
+    left_over = [f"  yaw torque left over  {m.yaw_torque:.3g} N m, {turn}"]
     return [
         f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
         *table_lines(kinds, "<<><", indent=2),
-        *left_over,
+        *(left_over if m.without_yaw and not m.with_yaw else []),
         *table_lines(critical, "<>>>>", indent=2),
     ]
 

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from rotorfault.analysis.roughness import limit_in_hover, why_rough
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
 from rotorfault.maths.arrays import Array, Complex
 from rotorfault.maths.geometry import Vec3, zeros
@@ -66,6 +67,9 @@ class LinearLoop(NamedTuple):
     names: tuple[str, ...]  # of the n states
     left_out: tuple[str, ...]  # states that do not act on the motion to first order
     residual: float  # largest relative change of a state per period, where the loop was linearised
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
     @property
     def poles(self) -> Complex:

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rotorfault.analysis.linearisation import AXES, LinearLoop
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.arrays import Array, Complex
 
 # Loop gains outside this range are not looked at. Our choice: no actuator is wrong by a factor of 1e5, and the loop
@@ -39,6 +40,9 @@ class Margins(NamedTuple):
     delay: float  # s; inf if none
     phase: float  # rad, least over all crossovers; inf if none
     crossover: float  # rad/s, where `delay` is decided; NaN if none
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 def margins(linear: LinearLoop) -> dict[str, Margins]:

@@ -9,6 +9,8 @@ changes nothing in them; `rotorfault.analysis.hover` says whether hover is still
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,8 +25,10 @@ from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.bounds import positive, require
+from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
-from rotorfault.base.foreign import is_place
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.maths.arrays import ANGLES
@@ -35,8 +39,9 @@ from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import part_from
-from rotorfault.scenario.scenario import substeps_of
+from rotorfault.scenario.scenario import named_places, substeps_of
 from rotorfault.scenario.slots import SLOTS
 
 __all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings", "trim_report"]
@@ -59,6 +64,9 @@ class Hover(NamedTuple):
     thrust_margin: float  # greatest total thrust over the one needed; below 1 there is no hover
     torque_max: Vec3  # N m: greatest torque about each body axis, either way, that leaves the thrust as it is
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class TrimReport(NamedTuple):
     """All that is known about a vehicle with a controller in hover; `text` prints it."""
@@ -72,6 +80,23 @@ class TrimReport(NamedTuple):
     linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
     margins: dict[str, Margins]  # per axis of `rotorfault.analysis.linearisation.AXES`; empty without linearisation
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        loop = "no linearisation" if self.linear is None else "stable" if self.linear.stable else "not stable"
+        names = f"{cut(self.vehicle)} with {cut(self.controller)}"
+        return cut(f"<trim of {names} at {self.period:g} s: {loop}, {len(self.warnings)} warning(s)>", LONGEST)
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        """Hover, margins and warnings as tables, for notebooks; `text` has poles and the linearisation too."""
+        title, _, _, *hover_lines = _hover_lines(self)
+        hover_rows = [re.split(r" {2,}", line.strip(), maxsplit=1) for line in hover_lines]
+        parts = [html_table(hover_rows, title=title)]
+        if self.margins:
+            parts.append(html_table(*_margin_table(self)))
+        return "".join([*parts, *(html_note(f"warning: {line}") for line in self.warnings)])
 
     def text(self) -> str:
         """Plain text for a terminal of 100 columns."""
@@ -143,6 +168,8 @@ def trim_report(
     preset: str | None = None,
     period: float = 0.001,
     loss: PerRotor | None = None,
+    *,
+    settings: Mapping[str, Any] | None = None,
 ) -> TrimReport:
     """Hover, what of it losses leave, closed-loop poles, gain and delay margins, and warnings.
 
@@ -157,12 +184,15 @@ def trim_report(
         Sampling period.
     loss : PerRotor, optional
         Of the rotors, 0 to 1, for `TrimReport.attainable`; all else is with sound rotors.
+    settings : mapping, optional
+        Dotted keys and values of the controller (``controller.cascade.tilt_max``) and of a vehicle that is given by
+        name, path or file (``vehicle.mass.value``), over what they have.
 
     Raises
     ------
     InputError
-        If the period is not above 0 and up to 0.1 s, a loss not in 0 to 1, or there is no such vehicle, controller or
-        preset.
+        If the period is not above 0 and up to 0.1 s, a loss not in 0 to 1, there is no such vehicle, controller or
+        preset, or a setting is of none of them.
     """
     require(vehicle, (Vehicle, VehicleFile, str, Path), "vehicle", "a name, a path that ends in .toml, or a Vehicle")
     if loss is not None:
@@ -170,14 +200,21 @@ def trim_report(
     period = positive(period, "period", "s", LONGEST_PERIOD)
     if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
         raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
+    mine, its = _shared_out(settings, isinstance(controller, str), not isinstance(vehicle, Vehicle))
     if isinstance(vehicle, (str, Path)):
         vehicle = load_vehicle(vehicle)
+    if isinstance(vehicle, VehicleFile) and its:
+        tables: dict[str, Any] = {"vehicle": vehicle.model_dump(mode="json")}
+        override_all(tables, its)
+        vehicle = validate(VehicleFile, tables["vehicle"], f"vehicle '{vehicle.name}' with its settings")
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
     if isinstance(controller, str):
-        table = {"kind": controller} | ({} if preset is None else {"preset": preset})
+        named: dict[str, Any] = {"controller": {"kind": controller} | ({} if preset is None else {"preset": preset})}
+        override_all(named, mine)
         # Whoever names code here wants it run.
-        part = part_from(CONTROLLER, table, (controller,) if is_place(controller) else False)
-        block, name = part.make(), controller + ("" if preset is None else f" ({preset})")
+        part = part_from(CONTROLLER, named["controller"], named_places(named))
+        words = ([] if preset is None else [preset]) + [f"{key.partition('.')[2]} = {v}" for key, v in mine.items()]
+        block, name = part.make(), controller + (f" ({', '.join(words)})" if words else "")
     else:
         block, name = as_controller(controller), type(controller).__name__
     warnings = [*vehicle_warnings(numbers), *sampled_data_check(block, numbers, period)]
@@ -190,6 +227,29 @@ def trim_report(
         warnings.append(f"no linearisation: {error}")
     possible = attainable(numbers, loss)
     return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, axis_margins, tuple(warnings))
+
+
+def _shared_out(
+    settings: Mapping[str, Any] | None, for_controller: bool, for_vehicle: bool
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings of the controller, and those of the vehicle; refuses what hover has not got."""
+    require(
+        settings or {}, Mapping, "settings", "dotted keys and values, such as {'controller.cascade.tilt_max': 0.5}"
+    )
+    found: dict[str, dict[str, Any]] = {CONTROLLER.name: {}, "vehicle": {}}
+    possible = {CONTROLLER.name: for_controller, "vehicle": for_vehicle}
+    allowed = "keys below controller. and vehicle., for trim looks at hover in still air with sound rotors"
+    elsewhere = {"controller.kind": "controller", "controller.preset": "preset", "period": "period"}
+    for key, value in (settings or {}).items():
+        first, dot, _ = str(key).partition(".")
+        if key in elsewhere:
+            raise InputError(f"{key}: is no setting here; give it as {elsewhere[key]} (--{elsewhere[key]})")
+        if first not in found or not dot:
+            raise InputError(f"{key}: is no setting of trim; allowed: {allowed}")
+        if not possible[first]:
+            raise InputError(f"{key}: the {first} is an object that is made already; give it by name, or change it")
+        found[first][key] = value
+    return found[CONTROLLER.name], found["vehicle"]
 
 
 def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list[str]:
@@ -259,14 +319,21 @@ def _margin_lines(report: TrimReport) -> list[str]:
         return ["Margins: none, the loop has no linearisation"]
     if not report.linear.stable:
         return ["Margins: none, the loop is not stable in hover"]
-    rows = [("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")]
+    rows, header, title = _margin_table(report)
+    return [
+        f"{title}, the others closed (diagnosis off, nominal allocation)",
+        *table_lines([header, *rows], "<>>>>>", 2),
+    ]
+
+
+def _margin_table(report: TrimReport) -> tuple[list[tuple[str, ...]], tuple[str, ...], str]:
+    """Rows, header and title."""
+    header = ("axis", "gain up", "gain down", "delay [ms]", "phase [deg]", "at rad/s")
+    rows: list[tuple[str, ...]] = []
     for axis, m in report.margins.items():
         up, down = (f"{g:.3g} ({_decibel(g)})" for g in (m.gain_up, m.gain_down))
         rows.append((axis, up, down, f"{1e3 * m.delay:.3g}", f"{math.degrees(m.phase):.3g}", f"{m.crossover:.3g}"))
-    return [
-        "Margins at the plant's input, one axis at a time, the others closed (diagnosis off, nominal allocation)",
-        *table_lines(rows, "<>>>>>", indent=2),
-    ]
+    return rows, header, "Margins at the plant's input, one axis at a time"
 
 
 def _warning_lines(report: TrimReport) -> list[str]:

@@ -13,6 +13,7 @@ from rotorfault.autopilot.prediction import Expectation, Prediction, predict
 from rotorfault.autopilot.rotor_model import RotorModel, believed_residual_speed, expected_thrust
 from rotorfault.base.errors import InputError
 from rotorfault.base.number_rule import short
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.signals import (
@@ -52,6 +53,9 @@ class Decision(NamedTuple):
     diagnosis: Diagnosis  # what is believed of the rotors
     stage: Scalar | tuple[()] = ()  # 0 as the scenario wants, 1 descending, 2 rotors stopped; empty if it never lands
     relief: Scalar | tuple[()] = ()  # share of every thrust that is taken back, 1 with rotors stopped; empty if none
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 @final

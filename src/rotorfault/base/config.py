@@ -19,6 +19,7 @@ from rotorfault.base.bounds import require_shallow, too_deep
 from rotorfault.base.errors import InputError, choices, nearest
 from rotorfault.base.number_rule import OWN, short, strict
 from rotorfault.base.number_rule import refusal as refusal
+from rotorfault.base.one_line import in_a_line
 from rotorfault.base.plain_text import printable
 
 M = TypeVar("M", bound=BaseModel)
@@ -37,6 +38,13 @@ class Strict(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def __repr__(self) -> str:
+        name = type(self).__qualname__.rpartition("<locals>.")[2]
+        return in_a_line(name, ((key, getattr(self, key, None)) for key in type(self).model_fields))
+
+    def __str__(self) -> str:
+        return repr(self)
 
     def code(self) -> tuple[str, ...]:
         """Places of code from outside the package that these settings would run."""

@@ -15,6 +15,7 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.one_line import LONGEST, cut
 
 ENTRY_POINTS = "rotorfault.parts"
 
@@ -54,6 +55,9 @@ class Registry(Generic[B]):
         self._slot = sort if slot is None else slot
         self._accept = accept
         self._members: dict[str, Kind[B]] = {}
+
+    def __repr__(self) -> str:
+        return cut(f"<registry of {self.sort}: {', '.join(self)}>", LONGEST)
 
     def add(self, name: str, kind: Kind[B]) -> None:
         """Register a part under a name; the last registration of a name holds."""

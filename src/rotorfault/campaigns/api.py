@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, final
 
-import pyarrow as pa
 import pyarrow.compute as pc
 
 from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError, short
 from rotorfault.base.executors import executor_of
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
-from rotorfault.campaigns.replay import differences, replay
+from rotorfault.campaigns.changes import KIND, changed, with_files
+from rotorfault.campaigns.flight_table import FlightTable
+from rotorfault.campaigns.replay import differences, is_changed, replay
 from rotorfault.campaigns.report.answer import Answer, answer
 from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.store.folder import FLIGHTS, PAGE, STUDY
 from rotorfault.campaigns.store.identity import read_identity
 from rotorfault.campaigns.store.store import Store
-from rotorfault.campaigns.study import Study, changed, load_study, sources_of, study_from
+from rotorfault.campaigns.study import Study, load_study, sources_of, study_from
 from rotorfault.flight import doubts
 from rotorfault.flight.flight import Flight
+from rotorfault.scenario.library import with_whole_paths
 
 Say = Callable[[str], None]
 
@@ -40,8 +44,8 @@ class Campaign:
     ----------
     folder : str or Path
         Of the campaign.
-    allow_code : bool
-        Whether code that its study names may run, to replay flights.
+    allow_code : bool or collection of str
+        Whether code that its study names may run, to replay flights, or which of it (``FILE.py:NAME``).
 
     Attributes
     ----------
@@ -49,22 +53,43 @@ class Campaign:
     study : Study
     """
 
-    def __init__(self, folder: str | Path, *, allow_code: bool = False) -> None:
+    def __init__(self, folder: str | Path, *, allow_code: bool | Collection[str] = False) -> None:
         require(folder, (str, Path), "folder", "the path of a campaign's folder")
+        require(allow_code, (bool, Collection), "allow_code", "True, False, or places such as 'mine.py:Mine'")
+        if not isinstance(allow_code, bool):
+            allow_code = with_whole_paths([allow_code] if isinstance(allow_code, str) else list(allow_code))
         self.folder = Path(folder)
         self._store = Store.open(self.folder)
         self.study: Study = study_from(self._store.study, str(self.folder / "study.json"), allow_code)
 
     def __repr__(self) -> str:
-        return f"<campaign {self.study.name} in {self.folder}>"
+        return cut(f"<campaign {cut(self.study.name)} in {self.folder}>", LONGEST)
 
-    def table(self) -> pa.Table:
+    def _repr_html_(self) -> str:
+        """Flights and successes of each variant so far, as a table for notebooks."""
+        table = self._store.table()
+        rows = []
+        for variant in self.study.variant:
+            flown = table.filter(pc.equal(table["variant"], variant.label))
+            first = flown.filter(pc.less(flown["number"], self.study.refine.initial))
+            good = int(pc.sum(first["success"]).as_py() or 0)
+            # Of the first round, as in the report: how many follow is decided by results.
+            rate = f"{good:,} of {first.num_rows:,}" + (
+                f" ({100.0 * good / first.num_rows:.3g} %)" if len(first) else ""
+            )
+            rows.append((variant.label, f"{flown.num_rows:,}", rate))
+        axes = ", ".join(part.name for part in self.study.axis)
+        title = f"campaign {self.study.name}: {self.study.cells:,} cells ({axes})"
+        note = f"{self.study.description or self.study.scenario_name}; in {self.folder}"
+        return html_table(rows, ("variant", "flights", "successes of the first round"), title) + html_note(note)
+
+    def table(self) -> FlightTable:
         """One row per flight that has been flown."""
-        return self._store.table()
+        return FlightTable(self._store.table())
 
     def maps(self) -> Maps:
         """Success rates, intervals, grades, differences by cell; see `rotorfault.campaigns.report.maps`."""
-        return maps(self.study, self.table())
+        return maps(self.study, self._store.table())
 
     def answer(self) -> Answer:
         """What was found: shares of the map, boundaries, differences; as text what the terminal ends with."""
@@ -84,27 +109,40 @@ class Campaign:
         from rotorfault.campaigns.report.report import write
 
         made_by = {**self._store.identity.versions, "source": self._store.identity.program}
-        return write(self.study, self.table(), self.folder, made_by)
+        return write(self.study, self._store.table(), self.folder, made_by)
 
-    def replay(self, identifier: int) -> Flight:
-        """Fly one of the flights once more, with everything recorded.
+    def replay(
+        self, identifier: int, *, controller: str | None = None, settings: Mapping[str, Any] | None = None
+    ) -> Flight:
+        """Fly one of the flights once more, with everything recorded, or with something else in it.
 
-        Warns (`ReplayWarning`) where its numbers are not those of the table.
+        Warns (`ReplayWarning`) where its numbers are not those of the table, unless something else was asked for.
 
         Parameters
         ----------
         identifier : int
             Column ``id`` of the table.
+        controller : str, optional
+            Name or place in code (``FILE.py:NAME``) in place of the flight's controller; the same place names it
+            again, and so allows it to run.
+        settings : mapping, optional
+            Dotted keys and values in place of the flight's.
 
         Raises
         ------
         InputError
-            If there is no such flight, or it needs code that is not allowed.
+            If there is no such flight, a value is not allowed, or it needs code that is not allowed.
         """
-        flight = replay(self.study, identifier)
-        for line in self.differences(identifier, flight):
-            warnings.warn(line, ReplayWarning, stacklevel=2)
+        changes = replay_changes(controller, settings)
+        flight = replay(self.study, identifier, changes)
+        if not changes or not is_changed(self.study, identifier, changes):
+            for line in self.differences(identifier, flight):
+                warnings.warn(line, ReplayWarning, stacklevel=2)
         return flight
+
+    def is_changed(self, identifier: int, changes: Mapping[str, Any]) -> bool:
+        """Whether changes, as `replay_changes` gives them, make another flight of one of the table."""
+        return is_changed(self.study, identifier, changes)
 
     def differences(self, identifier: int, flight: Flight) -> list[str]:
         """What of a replayed flight is not as in the table; empty where all agrees, or it was never flown.
@@ -116,7 +154,7 @@ class Campaign:
         flight : Flight
             Flown once more.
         """
-        table = self.table()
+        table = self._store.table()
         rows = table.filter(pc.equal(table["id"], identifier)).to_pylist()
         if not rows:
             return []
@@ -126,14 +164,33 @@ class Campaign:
         return [*(f"source of {place} has changed since the campaign was flown" for place in other), *lines]
 
 
+def replay_changes(controller: str | None, settings: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What a replay has in place of the flight's, as dotted keys and values, with whole paths.
+
+    Parameters
+    ----------
+    controller : str, optional
+    settings : mapping, optional
+
+    Raises
+    ------
+    InputError
+        If they are no settings.
+    """
+    named = {} if controller is None else {KIND: with_whole_paths(controller)}
+    return {**named, **with_files(settings)}
+
+
 def campaign(
     study: str | Path | Mapping[str, Any] | Study,
     out: str | Path | None = None,
     *,
     resume: bool = False,
     repair: bool = False,
+    controllers: str | Sequence[str] = (),
+    settings: Mapping[str, Any] | None = None,
     vehicle: str | None = None,
-    preset: str | None = None,
+    preset: str | Sequence[str] | None = None,
     seed: int | None = None,
     budget: int | None = None,
     workers: int | None = None,
@@ -154,14 +211,18 @@ def campaign(
         Resume the campaign in the folder.
     repair : bool
         Resume; move damaged parts aside and fly them anew.
+    controllers : str or sequence of str, optional
+        Names or places in code (``FILE.py:NAME``), compared in place of the study's controllers: each is a variant.
+    settings : mapping, optional
+        Dotted keys and values for all flights, over all that the study says.
     vehicle, preset, seed, budget : optional
-        In place of the study's; see `rotorfault.campaigns.study.changed`.
+        In place of the study's; see `rotorfault.campaigns.changes.changed`.
     workers : int, optional
         Threads; one per core if not given. Nothing in the table depends on it.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers fly.
     allow_code : bool
-        Whether code that the study names may run.
+        Whether code that the study names may run; code that is named here may.
     say : callable
         Is given, line by line, what was moved aside and the results of each round.
 
@@ -185,7 +246,9 @@ def campaign(
     else:
         raise InputError(f"study: got {short(study)}; allowed: a name, a path, tables or a Study")
     require("" if vehicle is None else vehicle, str, "vehicle", "a name, or a path that ends in .toml")
-    checked = changed(checked, vehicle, preset, seed, budget).resolved()
+    checked = changed(
+        checked, controllers=controllers, settings=settings, vehicle=vehicle, preset=preset, seed=seed, budget=budget
+    ).resolved()
     require("" if out is None else out, (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import axis
-from rotorfault.campaigns.study import Draw, Study
+from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.noise import threefry
 
 SEEDS = 10**12
@@ -40,6 +42,9 @@ class FlightSet(NamedTuple):
     variant: Counts
     cell: Counts
     number: Counts
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
     @property
     def size(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,9 +12,12 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.block import METRICS
 from rotorfault.campaigns.flight_set import FlightSet, flight_of, seeds, values_of
-from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.study import Study, study_from
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly
+from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.scenario import Scenario, allowed_with
+from rotorfault.scenario.slots import SLOTS
 
 AGREE = 1e-9  # relative: what a number may differ by on another processor
 
@@ -24,7 +28,7 @@ def settings_of(study: Study, flight: FlightSet) -> dict[str, Any]:
     return {**settings, "seed": int(seeds(study, flight)[0])}
 
 
-def replay(study: Study, identifier: int) -> Flight:
+def replay(study: Study, identifier: int, changes: Mapping[str, Any] | None = None) -> Flight:
     """Fly a flight of a campaign once more.
 
     Parameters
@@ -32,14 +36,61 @@ def replay(study: Study, identifier: int) -> Flight:
     study : Study
     identifier : int
         Column ``id`` of the campaign's table.
+    changes : mapping, optional
+        Dotted keys and values in place of the flight's, with whole paths of code, which may run.
 
     Raises
     ------
     InputError
-        If there is no such flight.
+        If there is no such flight, or a value is not allowed.
     """
     flight = flight_of(study, identifier)
-    return fly(study.scenarios[int(flight.variant[0])], settings=settings_of(study, flight))
+    number, drawn = int(flight.variant[0]), settings_of(study, flight)
+    if not changes:
+        return fly(study.scenario_of(number), settings=drawn)
+    tables = study.as_tables()
+    # One variant alone: the others, and what code they need, are of no matter to this flight.
+    tables |= {"overrides": {**tables["overrides"], **changes}, "variant": [tables["variant"][number]]}
+    scenario = study_from(tables, study.name, allowed_with(study.allows_code, changes)).scenario_of(0)
+    kept = {key: value for key, value in drawn.items() if _has(scenario, key)}
+    return fly(scenario, settings={**kept, **changes})
+
+
+def is_changed(study: Study, identifier: int, changes: Mapping[str, Any]) -> bool:
+    """Whether changes make another flight of one of a campaign; not where they only say what it has.
+
+    Parameters
+    ----------
+    study : Study
+    identifier : int
+    changes : mapping
+        Dotted keys and values.
+
+    Raises
+    ------
+    InputError
+        If there is no such flight, or a key leads nowhere.
+    """
+    flight = flight_of(study, identifier)
+    tables = study.tables_of(int(flight.variant[0]))
+    override_all(tables, settings_of(study, flight))
+    after = copy.deepcopy(tables)
+    override_all(after, copy.deepcopy(dict(changes)))
+    return after != tables
+
+
+def _has(scenario: Scenario, key: str) -> bool:
+    """Whether a scenario has what a drawn key sets: a part of another kind may not."""
+    name, *path = key.split(".")
+    if name not in SLOTS or not path:
+        return True
+    slot = SLOTS[name]
+    if slot.many:
+        parts = scenario.all(slot)
+        part, path = (parts[int(path[0])] if int(path[0]) < len(parts) else None), path[1:]
+    else:
+        part = scenario.maybe(slot)
+    return part is not None and (not path or path[0] in {"kind", "preset", *type(part.settings).model_fields})
 
 
 def differences(row: Mapping[str, Any], scores: Mapping[str, Any]) -> list[str]:

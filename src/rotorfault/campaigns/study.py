@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 import json
-import re
+from collections.abc import Collection
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
@@ -18,90 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, as_text, unknown
-from rotorfault.base.number_rule import short
-from rotorfault.campaigns.axes import axis, out_of_range
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.campaigns.grades import GRADES, SUCCESS
 from rotorfault.campaigns.sampling.refine import Refinement
-from rotorfault.campaigns.studies import FOLDER, study_names
+from rotorfault.campaigns.studies import FOLDER, LONGEST_NAME, NAME, study_names
+from rotorfault.campaigns.varied import Draw, GridAxis
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.library import is_file, load_scenario
+from rotorfault.scenario.library import is_file, load_scenario, with_whole_paths
 from rotorfault.scenario.overrides import override_all
+from rotorfault.scenario.preset_file import beside, is_preset_file
 from rotorfault.scenario.scenario import Scenario, scenario_from
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000
-
-
-class GridAxis(Strict):
-    """One axis of the map: values, or a number of them evenly spaced between two."""
-
-    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
-    values: tuple[float | str, ...] | None = Field(default=None, description="the values")
-    start: float | None = Field(default=None, description="first value")
-    stop: float | None = Field(default=None, description="last value")
-    count: int | None = Field(default=None, ge=2, le=10_000, description="how many")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> GridAxis:
-        _require_axis(self.name)
-        by_range = (self.start, self.stop, self.count)
-        if self.values is not None:
-            if any(part is not None for part in by_range):
-                raise refusal("values", "cannot stand beside start, stop and count; give one or the other")
-            if not self.values:
-                raise refusal("values", "is empty; give at least one value")
-            if len(set(self.values)) < len(self.values):
-                raise refusal("values", f"has values twice: {list(self.values)}; give each once")
-        elif self.start is None or self.stop is None or self.count is None:
-            raise refusal("values", "is missing; give values, or start, stop and count")
-        elif not self.start < self.stop:
-            raise refusal("stop", f"got {self.stop:g}, an empty range; allowed: above start = {self.start:g}")
-        if len({isinstance(value, str) for value in self.grid}) > 1:
-            raise refusal("values", f"has numbers and texts: {short(list(self.grid))}; allowed: one or the other")
-        if wrong := out_of_range(self.name, self.grid):
-            raise refusal("values", wrong)
-        return self
-
-    @property
-    def grid(self) -> list[float | str]:
-        """The values in order."""
-        if self.values is not None:
-            return list(self.values)
-        start, stop, count = self.start or 0.0, self.stop or 0.0, self.count or 0
-        return [round(float(v), 12) for v in np.linspace(start, stop, count)]
-
-
-class Draw(Strict):
-    """A quantity that is drawn for each flight: uniform between two values, normal, or one of some values."""
-
-    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
-    uniform: tuple[float, float] | None = Field(default=None, description="least and largest value")
-    normal: tuple[float, float] | None = Field(
-        default=None, description="mean and standard deviation; cut at the range of the axis"
-    )
-    choice: tuple[float | str, ...] | None = Field(default=None, description="values, equally likely")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Draw:
-        _require_axis(self.name)
-        if sum(part is not None for part in (self.uniform, self.normal, self.choice)) != 1:
-            raise refusal("", "give one of uniform, normal and choice")
-        if self.uniform is not None and not self.uniform[0] < self.uniform[1]:
-            raise refusal("uniform", f"got {list(self.uniform)}, an empty range; allowed: [least, largest]")
-        if self.normal is not None and not self.normal[1] > 0.0:
-            raise refusal("normal", f"got {list(self.normal)}; allowed: [mean, deviation above 0]")
-        if self.choice is not None and not self.choice:
-            raise refusal("choice", "is empty; give at least one value")
-        if len({isinstance(value, str) for value in self.choice or ()}) > 1:
-            raise refusal(
-                "choice", f"has numbers and texts: {short(list(self.choice or ()))}; allowed: one or the other"
-            )
-        if wrong := out_of_range(self.name, (*(self.uniform or ()), *(self.choice or ()))):
-            raise refusal("", wrong)
-        return self
 
 
 class Variant(Strict):
@@ -116,8 +49,8 @@ class Study(Strict):
 
     name: str = Field(
         min_length=1,
-        pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$",
-        max_length=100,
+        pattern=NAME,
+        max_length=LONGEST_NAME,
         description="short name, also of the folder",
     )
     description: str = Field(default="", description="one line")
@@ -136,10 +69,13 @@ class Study(Strict):
     variant: tuple[Variant, ...] = Field(
         min_length=1, max_length=20, description="[[variant]] tables: what is compared"
     )
+    overrides: dict[str, Any] = Field(
+        default={}, description="dotted keys and values for all flights, over those of the variants"
+    )
     refine: Refinement = Field(default=Refinement(), description="how many flights a cell gets")
     success: tuple[str, ...] = Field(default=SUCCESS, min_length=1, description="grades that count as success")
 
-    _allow_code: bool = PrivateAttr(default=False)  # whether code that it names may run
+    _allow_code: bool | Collection[str] = PrivateAttr(default=False)  # whether code that it names may run, or which
 
     @field_validator("success")
     @classmethod
@@ -172,9 +108,17 @@ class Study(Strict):
             )  # fmt: skip
         return self
 
+    def __repr__(self) -> str:
+        axes = ", ".join(part.name for part in self.axis)
+        labels = ", ".join(variant.label for variant in self.variant)
+        text = (
+            f"<study {cut(self.name)} of {cut(self.scenario_name)}: {self.cells:,} cells ({axes}), variants {labels}>"
+        )
+        return cut(text, LONGEST)
+
     @property
-    def allows_code(self) -> bool:
-        """Whether code that it names may run."""
+    def allows_code(self) -> bool | Collection[str]:
+        """Whether code that it names may run, or which of it."""
         return self._allow_code
 
     @property
@@ -215,13 +159,31 @@ class Study(Strict):
         tables = self.as_tables()
         if isinstance(self.scenario, str):
             try:
-                tables["scenario"] = self._scenario_tables()
+                tables["scenario"] = self.scenario_tables()
             except InputError as error:
                 raise InputError(f"study '{self.name}': {error}") from None
-        for settings in (tables["settings"], *(variant["settings"] for variant in tables["variant"])):
+        tables["scenario"] = with_whole_paths(tables["scenario"])
+        tables |= {key: with_whole_paths(tables[key]) for key in ("settings", "overrides", "variant")}
+        each = (tables["settings"], tables["overrides"], *(variant["settings"] for variant in tables["variant"]))
+        for settings in each:
             if as_text(settings.get("vehicle", "")).endswith(".toml"):
                 settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
+        self._lay_out_presets(tables)
         return study_from(tables, self.name, self._allow_code)
+
+    def _lay_out_presets(self, tables: dict[str, Any]) -> None:
+        """Put the settings of presets from files in place of the files, in the tables of the study."""
+        common = (tables["settings"], tables["overrides"])
+        everywhere = any(_names_preset_file(settings) for settings in (tables["scenario"], *common))
+        for number, variant in enumerate(tables["variant"]):
+            if everywhere or _names_preset_file(variant["settings"]):
+                part = self.scenario_of(number)[CONTROLLER]
+                rest = {key: value for key, value in variant["settings"].items() if not _of_controller(key)}
+                variant["settings"] = {**rest, CONTROLLER.name: part.as_table()}
+        if everywhere:
+            for settings in common:
+                for key in [key for key in settings if _of_controller(key)]:
+                    del settings[key]
 
     @property
     def own_sources(self) -> dict[str, str]:
@@ -258,14 +220,27 @@ class Study(Strict):
         InputError
             If the scenario cannot be used, a setting is not allowed, or code would run that nobody has allowed.
         """
+        return tuple(self.scenario_of(number) for number in range(len(self.variant)))
+
+    def scenario_of(self, number: int) -> Scenario:
+        """What one variant flies, before anything varies; code that only others name need not be allowed.
+
+        Parameters
+        ----------
+        number : int
+            Place of the variant, from 0 on.
+
+        Raises
+        ------
+        InputError
+            As for `scenarios`.
+        """
         for place, what in self._varied_code().items():
             try:
                 foreign.require_allowed(place, self._allow_code, what)
             except InputError as error:
                 raise InputError(f"study '{self.name}': {error}") from None
-        return tuple(self._scenario_of(variant) for variant in self.variant)
-
-    def _scenario_of(self, variant: Variant) -> Scenario:
+        variant = self.variant[number]
         try:
             return self._scenario({**self.settings, **variant.settings})
         except InputError as error:
@@ -277,19 +252,53 @@ class Study(Strict):
                 where = f"study '{self.name}'" if str(without) == str(error) else where
             raise InputError(f"{where}: {error}") from None
 
+    def tables_of(self, number: int) -> dict[str, Any]:
+        """The tables of the scenario that one variant flies, unchecked: none of the code that they name runs.
+
+        Parameters
+        ----------
+        number : int
+            Place of the variant, from 0 on.
+        """
+        return self._tables({**self.settings, **self.variant[number].settings})
+
     def _scenario(self, settings: dict[str, Any]) -> Scenario:
-        tables = self._scenario_tables() if isinstance(self.scenario, str) else copy.deepcopy(self.scenario)
-        # Not as overrides of the scenario, which may name code, for a user gives them: a study may be a stranger's.
-        override_all(tables, settings)
+        tables = self._tables(settings)
         return scenario_from(tables, as_text(tables.get("name", "scenario")), self._allow_code)
 
-    def _scenario_tables(self) -> dict[str, Any]:
-        """The scenario that it names."""
-        return load_scenario(str(self.scenario), allow_code=self._allow_code).as_tables()
+    def _tables(self, settings: dict[str, Any]) -> dict[str, Any]:
+        tables = self.scenario_tables()
+        # Not as overrides of the scenario, which may name code, for a user gives them: a study may be a stranger's.
+        override_all(tables, copy.deepcopy(settings))
+        override_all(tables, copy.deepcopy(self.overrides))
+        return tables
+
+    def scenario_tables(self) -> dict[str, Any]:
+        """Tables of the scenario that it names or holds, before any settings.
+
+        Raises
+        ------
+        InputError
+            If the scenario that it names cannot be used.
+        """
+        if not isinstance(self.scenario, str):
+            return copy.deepcopy(self.scenario)
+        return load_scenario(self.scenario, allow_code=self._allow_code).as_tables()
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Goes to other processes as plain data: scenarios hold registered parts, which cannot be pickled.
         return study_from, (self.as_tables(), self.name, self._allow_code)
+
+
+def _of_controller(key: str) -> bool:
+    return key.partition(".")[0] == CONTROLLER.name
+
+
+def _names_preset_file(settings: dict[str, Any]) -> bool:
+    """Whether settings name a preset of the controller by its file."""
+    table = settings.get(CONTROLLER.name)
+    inner = table.get("preset") if isinstance(table, dict) else None
+    return is_preset_file(settings.get(f"{CONTROLLER.name}.preset")) or is_preset_file(inner)
 
 
 def sources_of(scenario: Scenario) -> dict[str, str]:
@@ -300,13 +309,6 @@ def sources_of(scenario: Scenario) -> dict[str, str]:
     scenario : Scenario
     """
     return {place: digest for _, part in scenario.parts() for place, digest in part.sources.items()}
-
-
-def _require_axis(name: str) -> None:
-    try:
-        axis(name)
-    except InputError as error:
-        raise refusal("name", str(error)) from None
 
 
 def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None, *, allow_code: bool = False) -> Study:
@@ -345,40 +347,17 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
     if as_text(tables.get("scenario", "")).endswith(".toml"):
         tables["scenario"] = str(folder / tables["scenario"])
     variants = tables.get("variant", [])
-    for owner in [tables, *(variants if isinstance(variants, list) else [])]:
-        settings: Any = owner.get("settings") if isinstance(owner, dict) else None
+    owners = [tables, *(variants if isinstance(variants, list) else [])]
+    each: list[Any] = [owner.get("settings") for owner in owners if isinstance(owner, dict)]
+    for settings in [*each, tables.get("overrides")]:
         for key, value in settings.items() if isinstance(settings, dict) else ():
             if is_file(value) or (key == "vehicle" and as_text(value).endswith(".toml")):
                 settings[key] = str(folder / value)
+            if key == f"{CONTROLLER.name}.preset":
+                settings[key] = beside(folder, value)
 
 
-def changed(
-    study: Study, vehicle: str | None = None, preset: str | None = None, seed: int | None = None,
-    budget: int | None = None,
-) -> Study:  # fmt: skip
-    """The same study with another vehicle, preset of all controllers, seed or budget.
-
-    Raises
-    ------
-    InputError
-        If a value is not allowed.
-    """
-    tables = study.as_tables()
-    if vehicle is not None:
-        for variant in tables["variant"]:
-            variant["settings"] = {**variant.get("settings", {}), "vehicle": vehicle}
-        tables["name"] += "-" + re.sub(r"[^A-Za-z0-9_.-]", "-", Path(vehicle).stem)
-    if preset is not None:
-        for variant in tables["variant"]:
-            variant["settings"] = {**variant.get("settings", {}), "controller.preset": preset}
-    if seed is not None:
-        tables["seed"] = seed
-    if budget is not None:
-        tables["refine"]["budget"] = budget
-    return study_from(tables, study.name, study.allows_code)
-
-
-def study_from(tables: dict[str, Any], where: str, allow_code: bool = False) -> Study:
+def study_from(tables: dict[str, Any], where: str, allow_code: bool | Collection[str] = False) -> Study:
     """Check a study given as tables.
 
     Parameters
@@ -387,8 +366,8 @@ def study_from(tables: dict[str, Any], where: str, allow_code: bool = False) -> 
         As a study file holds them.
     where : str
         Their origin, for messages.
-    allow_code : bool
-        Whether code that the study names may run.
+    allow_code : bool or collection of str
+        Whether code that the study names may run, or which of it.
 
     Raises
     ------

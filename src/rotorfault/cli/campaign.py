@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorfault.base.errors import InputError
-from rotorfault.cli.app import AllowCode, app, finish, say, stopped
+from rotorfault.base.errors import InputError, short
+from rotorfault.cli.app import AllowCode, Assignments, app, finish, say, stopped
 
 if TYPE_CHECKING:
     from rotorfault.campaigns.api import Campaign
@@ -34,8 +34,25 @@ def campaign(
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://...", help="Fly on the workers of this Dask scheduler.")
     ] = None,
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--controller",
+            metavar="NAME",
+            help="Registered controller, or FILE.py:NAME for a class of your own, in place of the study's; each that "
+            "is given is a variant.",
+        ),
+    ] = None,
+    assignments: Assignments = None,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle in place of the study's.")] = None,
-    preset: Annotated[str | None, typer.Option(help="Preset of all controllers: gentle for slow rotors.")] = None,
+    presets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--preset",
+            metavar="NAME|FILE",
+            help="Preset of all controllers, or a TOML file of one, for the controller that it is for; repeatable.",
+        ),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
@@ -50,17 +67,24 @@ def campaign(
     Ctrl-C, or a kill, loses the blocks in flight only; --resume completes it to the same table. Ends with what was
     found; so it does, and flies nothing, where the campaign is complete already.
 
-    Example: rotorfault campaign partial-loss-map --out campaigns/partial-loss-map
+    Controllers of your own are compared with --controller, any other part with --set wind.kind=FILE.py:NAME. Code
+    that is named here may run; code that a study names needs --allow-code.
+
+    Example: rotorfault campaign partial-loss-map --controller smc --controller examples/controller.py:PdController
     """
     from rotorfault.campaigns.api import Campaign
     from rotorfault.campaigns.api import campaign as fly_campaign
+    from rotorfault.scenario.overrides import parse_overrides
+
+    settings = parse_overrides(assignments or [])
 
     if report_only:
         if out is None:
             raise InputError("--report-only needs the folder of a campaign; give it with --out")
-        if study is not None or resume or repair or not report:
+        if study is not None or resume or repair or not report or settings:
             raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
-        there = Campaign(out, allow_code=allow_code)
+        # A controller of the campaign may be named again, and so allowed.
+        there = Campaign(out, allow_code=allow_code or controllers or False)
         _report(there)
         say(str(there.answer()))
         return
@@ -70,9 +94,9 @@ def campaign(
         )
     try:
         done = fly_campaign(
-            study, out, resume=resume, repair=repair, vehicle=vehicle, preset=preset, seed=seed, budget=budget,
-            workers=workers, scheduler=scheduler, say=lambda line: say(line, err=True),
-            allow_code=allow_code,
+            study, out, resume=resume, repair=repair, controllers=controllers or (), settings=settings,
+            vehicle=vehicle, preset=presets, seed=seed, budget=budget, workers=workers, scheduler=scheduler,
+            say=lambda line: say(line, err=True), allow_code=allow_code,
         )  # fmt: skip
     except KeyboardInterrupt:
         raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
@@ -88,20 +112,33 @@ def replay(
     cell: Annotated[int | None, typer.Option(help="Or a cell of the map (column 'cell'), with --variant.")] = None,
     variant: Annotated[str | None, typer.Option(help="Variant, with --cell.")] = None,
     number: Annotated[int, typer.Option(help="Which flight of the cell.")] = 0,
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Controller in place of the flight's, or the flight's own FILE.py:NAME, named again to let it run.",
+        ),
+    ] = None,
+    assignments: Assignments = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for results; DIR-replays/ID if not given.")
     ] = None,
     allow_code: AllowCode = False,
 ) -> None:
-    """Fly one flight of a campaign once more, exactly, with all records and figures.
+    """Fly one flight of a campaign once more, exactly, with all records and figures; or with something else in it.
 
-    Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc
+    With --controller or --set it is the same flight (wind, faults, seed) under another controller or setting. Code
+    that is named here may run; code that the campaign names needs --allow-code.
+
+    Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc --controller sdre
     """
     from rotorfault.base.files import output_folder
-    from rotorfault.campaigns.api import Campaign
+    from rotorfault.campaigns.api import Campaign, replay_changes
     from rotorfault.campaigns.replay import identifier_of
+    from rotorfault.scenario.overrides import parse_overrides
 
+    settings = parse_overrides(assignments or [])
     folder = folder.resolve()
     campaign = Campaign(folder, allow_code=allow_code)
     study = campaign.study
@@ -112,12 +149,18 @@ def replay(
         if variant is None:
             raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
         flight = identifier_of(study, variant, cell, number)
-    target = out or folder.with_name(f"{folder.name}-replays") / str(flight)
+    changes = replay_changes(controller, settings)
+    changed = bool(changes) and campaign.is_changed(flight, changes)
+    target = out or folder.with_name(f"{folder.name}-replays") / (f"{flight}-changed" if changed else str(flight))
     output_folder(target)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # told below, in lines of their own
-        flown = campaign.replay(flight)
+        flown = campaign.replay(flight, controller=controller, settings=settings)
     finish(flown, target, figures)
+    if changed:
+        named = ", ".join(f"{key} = {short(value)}" for key, value in changes.items())
+        say(f"not the flight of the table, but with {named}")
+        return
     differences = campaign.differences(flight, flown)
     for line in differences:
         say(f"warning: {line}", err=True)

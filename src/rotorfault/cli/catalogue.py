@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from rotorfault.base.config import parse_toml, read_text
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import output_folder, write_atomically
 from rotorfault.base.text_table import table_lines
-from rotorfault.campaigns.studies import study_names
+from rotorfault.campaigns.studies import new_study, study_names
+from rotorfault.cli import details
+from rotorfault.cli.kinds_of_file import Kind, kind_of
 from rotorfault.engine import ENGINES
 from rotorfault.model.vehicle_check import vehicle_warnings
 from rotorfault.model.vehicle_file import load_vehicle, new_vehicle, vehicle_names
@@ -20,6 +23,8 @@ from rotorfault.scenario.library import load_scenario, new_scenario, scenario_na
 from rotorfault.scenario.scenario import scenario_from
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.vehicle_lines import vehicle_lines
+
+QUANTITIES = "quantities"
 
 
 def entries() -> dict[str, dict[str, str]]:
@@ -43,18 +48,43 @@ def _description(package: str, name: str) -> str:
     return str(tomllib.loads(text).get("description", ""))
 
 
-def text(group: str | None = None) -> str:
-    """Everything registered, one line each; only one group if it is named.
+def text(words: Sequence[str] = (), allow_code: bool = False) -> str:
+    """Everything registered, one line each; a group; or all about what is named.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Nothing for everything; a group, in the plural or as the key of a scenario; a name; a group and a name in it.
+    allow_code : bool
+        Whether code that a file names may run.
 
     Raises
     ------
     InputError
-        If there is no such group.
+        If there is no such group or name.
     """
     every = entries()
-    if group is not None and group not in every:
-        raise InputError(unknown("group", group, list(every)))
-    shown = every if group is None else {group: every[group]}
+    if len(words) > 2:
+        raise InputError(f"list takes a group, a name, or both; got {' '.join(words)}")
+    if not words or (group := _group(words[0])) is None:
+        if len(words) == 2:
+            raise InputError(unknown("group", words[0], list(every)))
+        return details.text(words[0], None, allow_code) if words else _lines(every)
+    if len(words) == 2:
+        return details.text(words[1], group, allow_code)
+    return details.quantities_text() if group == QUANTITIES else _lines({group: every[group]})
+
+
+def _group(word: str) -> str | None:
+    """The group that a word names, in the plural or singular; None if it names none."""
+    known = {group: group for group in ("scenarios", "vehicles", "engines", "studies", QUANTITIES)}
+    known |= {"scenario": "scenarios", "vehicle": "vehicles", "engine": "engines", "study": "studies"}
+    for slot in SLOTS:
+        known |= dict.fromkeys((slot.name, slot.registry.sort, slot.group), slot.group)
+    return known.get(word)
+
+
+def _lines(shown: Mapping[str, Mapping[str, str]]) -> str:
     width = max(len(name) for names in shown.values() for name in names)
     blocks = []
     for title, names in shown.items():
@@ -68,10 +98,10 @@ def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
     Raises
     ------
     InputError
-        If it is neither vehicle nor scenario, the name is no file name, the file exists, or the folder cannot be
-        written.
+        If it is neither vehicle, scenario nor study, the name is no file name, the file exists, or the folder cannot
+        be written.
     """
-    makers = {"vehicle": new_vehicle, "scenario": new_scenario}
+    makers = {"vehicle": new_vehicle, "scenario": new_scenario, "study": new_study}
     if what not in makers:
         raise InputError(unknown("kind of file", what, list(makers)))
     name = name.removesuffix(".toml")
@@ -109,13 +139,27 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
         return line, vehicle_lines(scenario)
     text = read_text(path)
     if path.suffix != ".toml":
-        raise InputError(f"{path}: ends in '{path.suffix}'; allowed: .toml (vehicle, scenario) or .nc (flight)")
-    tables = parse_toml(text, str(path))
-    # A vehicle has rotors and a mass, a scenario a reference and a duration; a bad file may lack some of either.
-    if {"mass", "rotor", "inertia_x", "thrust_max"} & set(tables):
-        vehicle = load_vehicle(path)
-        line = f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
-        return line, vehicle_warnings(vehicle.vehicle)
+        allowed = ".toml (vehicle, scenario, study) or .nc (flight)"
+        raise InputError(f"{path}: ends in '{path.suffix}'; allowed: {allowed}")
+    kind, keys = kind_of(parse_toml(text, str(path)), str(path))
+    checks: dict[Kind, Callable[[Path, bool], tuple[str, list[str]]]] = {
+        "vehicle": _check_vehicle,
+        "scenario": _check_scenario,
+        "study": _check_study,
+    }
+    try:
+        return checks[kind](path, allow_code)
+    except InputError as error:
+        raise InputError(f"{error} (read as a {kind}, for it has {keys})") from None
+
+
+def _check_vehicle(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+    vehicle = load_vehicle(path)
+    line = f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
+    return line, vehicle_warnings(vehicle.vehicle)
+
+
+def _check_scenario(path: Path, allow_code: bool) -> tuple[str, list[str]]:
     scenario = load_scenario(path, allow_code=allow_code)
     # Compiles nothing: parts, start and reference, as a flight would have them.
     from rotorfault.flight.assembly import assemble
@@ -126,3 +170,22 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
         f"{scenario[PLANT].kind} flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
     )
     return line, vehicle_lines(scenario)
+
+
+def _check_study(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+    from rotorfault.campaigns import run
+    from rotorfault.campaigns.study import load_study
+    from rotorfault.flight.reference_rows import unflown
+
+    study = load_study(path, allow_code=allow_code).resolved()
+    run.check(study)
+    labels = ", ".join(variant.label for variant in study.variant)
+    axes = ", ".join(part.name for part in study.axis)
+    line = (
+        f"{path}: study '{study.name}' of {study.scenario_name}, {study.cells:,} cells ({axes}), "
+        f"{len(study.variant)} variant(s) ({labels}), {study.most_flights:,.0f} flights at most; ok"
+    )
+    found: dict[str, None] = {}
+    for scenario in study.scenarios:
+        found |= dict.fromkeys([*vehicle_lines(scenario), *unflown(scenario)])
+    return line, list(found)

@@ -24,7 +24,10 @@ def fly(
     controller: Annotated[
         str | None, typer.Option(help="Registered controller, or FILE.py:NAME for a class of your own.")
     ] = None,
-    preset: Annotated[str | None, typer.Option(help="Preset of the controller: paper, tuned ...")] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="Preset of the controller: paper, tuned ..., or a TOML file of one."),
+    ] = None,
     assignments: Assignments = None,
     engine: Annotated[str | None, typer.Option(help="simd, numpy or python; the fastest installed.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of sensor noise and gusts.")] = None,
@@ -101,16 +104,18 @@ def compare(
 
     Example: rotorfault compare results/a/flight.nc results/b/flight.nc --out results/a-b
     """
+    from rich.console import Console
+
     from rotorfault.base.files import output_folder
-    from rotorfault.flight import comparison
+    from rotorfault.flight.comparison import compare as flights_side_by_side
 
     if len(flights) < 2:
         raise InputError(f"got {len(flights)} flight file; compare needs at least two")
     folder = out or Path("results") / "compare"
     if figures:
         output_folder(folder)
-    loaded = comparison.labelled(flights)
-    comparison.print_table(loaded)
+    compared = flights_side_by_side(flights)
+    Console().print(compared)
     if figures:
-        written = comparison.draw(loaded, folder)
+        written = compared.save_plots(folder)
         say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")

@@ -13,17 +13,30 @@ from rotorfault.cli.app import AllowCode, app, say
 
 @app.command("list")
 def list_parts(
-    what: Annotated[str | None, typer.Argument(help="Only this: controllers, vehicles, scenarios ...")] = None,
+    what: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[GROUP] [NAME]",
+            help="A group (controllers, vehicles, studies ...), a name (roismc, hummingbird, hover-fault ...), a "
+            "file of one, FILE.py:NAME for a part of your own, or: quantities.",
+        ),
+    ] = None,
+    allow_code: AllowCode = False,
 ) -> None:
-    """List everything registered, one line each."""
+    """List what there is to choose from; of a part, a vehicle, a scenario or a study all that can be set.
+
+    'quantities' are what a study may vary. A name that several things bear shows each; a group before it picks one.
+
+    Example: rotorfault list controller roismc
+    """
     from rotorfault.cli import catalogue
 
-    say(catalogue.text(what))
+    say(catalogue.text(what or (), allow_code))
 
 
 @app.command()
 def new(
-    what: Annotated[str, typer.Argument(metavar="vehicle|scenario", help="What to write.")],
+    what: Annotated[str, typer.Argument(metavar="vehicle|scenario|study", help="What to write.")],
     name: Annotated[str, typer.Argument(help="Its name; the file becomes NAME.toml.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path("."),
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
@@ -39,7 +52,9 @@ def new(
 def check(
     file: Annotated[
         str,
-        typer.Argument(help="Vehicle or scenario TOML file, a flight.nc, or FILE.py:NAME for a part of your own."),
+        typer.Argument(
+            help="TOML file of a vehicle, scenario or study, a flight.nc, or FILE.py:NAME for a part of your own."
+        ),
     ],
     assignments: Annotated[
         list[str] | None,
@@ -80,8 +95,19 @@ def trim(
     controller: Annotated[
         str, typer.Option(help="Registered controller, or FILE.py:NAME for a class of your own.")
     ] = "roismc",
-    preset: Annotated[str | None, typer.Option(help="Preset of the controller.")] = None,
+    preset: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="Preset of the controller, or a TOML file of one.")
+    ] = None,
     period: Annotated[float, typer.Option(help="Sampling period [s].")] = 0.001,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Setting of the controller or number of the vehicle, e.g. controller.cascade.tilt_max=0.5 or "
+            "vehicle.mass.value=2; may be repeated.",
+        ),
+    ] = None,
     losses: Annotated[
         list[str] | None,
         typer.Option("--loss", metavar="R=VALUE", help="Loss of rotor R, 0 to 1; one for each rotor at most."),
@@ -95,5 +121,7 @@ def trim(
     """
     from rotorfault.analysis.trim import trim_report
     from rotorfault.cli.losses import parse_losses
+    from rotorfault.scenario.overrides import parse_overrides
 
-    say(trim_report(vehicle, controller, preset, period, parse_losses(losses or [])).text())
+    settings = parse_overrides(assignments or [])
+    say(trim_report(vehicle, controller, preset, period, parse_losses(losses or []), settings=settings).text())

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base.one_line import record_line
 from rotorfault.engine.noise import Noise, Stream
 from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopState
 from rotorfault.maths.arrays import Array
@@ -28,6 +29,9 @@ class Batch(NamedTuple):
     every: int = 1  # record each so many steps; 0 records nothing
     wanted: tuple[int, ...] | None = None  # rows of the loop's layout that are recorded; None for all
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
     @property
     def steps(self) -> int:
         """Number of sampling periods."""
@@ -44,6 +48,9 @@ class Recording(NamedTuple):
     state: Array  # (leaves of `LoopState`, N): at the end, scores included
     flown: int  # flight-steps that were computed
     interrupted: bool = False
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 Watch = Callable[[int], bool]

@@ -16,10 +16,11 @@ from rotorfault.base.bounds import require
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place, load
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.text_table import table_lines
 from rotorfault.flight.rules import Check, Rules
 from rotorfault.model.block import Block, NoSettings
-from rotorfault.model.slot import Slot, slot_of
+from rotorfault.model.slot import Slot
 from rotorfault.plant.faults import FAULT
 from rotorfault.scenario.part import Part, part_from
 from rotorfault.scenario.slots import SLOTS
@@ -51,7 +52,7 @@ class BlockReport:
 
     def __repr__(self) -> str:
         broken = [check.rule for check in self.checks if not check.kept]
-        return f"<{self.part}: {'all rules kept' if not broken else 'broken: ' + ', '.join(broken)}>"
+        return cut(f"<{self.part}: {'all rules kept' if not broken else 'broken: ' + ', '.join(broken)}>", LONGEST)
 
 
 def check_block(
@@ -93,25 +94,17 @@ def _part(part: object, settings: dict[str, Any]) -> Part[Any]:
     if isinstance(part, str):
         if not is_place(part):
             raise InputError(f"part: got '{part}'; allowed: a class, an object, or a place such as FILE.py:NAME")
-        slot, _ = _home(load(part, "part"))
+        slot, _ = SLOTS.home_of(load(part, "part"))
         return part_from(slot, {"kind": part, **_some(slot, settings)}, allow=True)
     if not isinstance(part, (type, Block)) and callable(getattr(part, "update", None)):
         part = as_controller(part)
-    slot, kind = _home(part)
+    slot, kind = SLOTS.home_of(part)
     if isinstance(part, Block):
         plain = type(part).__init__ is Block.__init__
         chosen, kind = (part.settings, type(part)) if plain else (NoSettings(), _Made(part))
         return Part(slot, type(part).__name__, chosen, factory=kind)
     name = getattr(part, "__name__", type(part).__name__)
     return Part(slot, name, validate(kind.Settings, _some(slot, settings), name), factory=kind)
-
-
-def _home(part: object) -> tuple[Slot[Any], Any]:
-    """Slot of a class or an object, and what makes parts of settings."""
-    for slot in SLOTS:
-        if slot.adapt is not None and (adapted := slot.adapt(part)) is not None:
-            return slot, adapted
-    return slot_of(part), part
 
 
 @final

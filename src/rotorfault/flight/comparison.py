@@ -1,46 +1,189 @@
-"""Several flights side by side: a table, and figures with all of them."""
+"""Several flights side by side: `compare`, and the `Comparison` that it gives back."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, final
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from rotorfault.base.errors import InputError, short
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.plain_text import one_line
+from rotorfault.base.text_table import terminal_width
 from rotorfault.flight.flight import Flight, load
-from rotorfault.report import figures
+from rotorfault.results.score_table import ScoreTable
 from rotorfault.results.text import UNTIL_LOST, comparison
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def labelled(paths: Sequence[Path]) -> dict[str, Flight]:
-    """Flights by a label that tells them apart: the controller, with the folder where that is not enough."""
-    loaded = [load(path) for path in paths]
-    labels = [flight.label for flight in loaded]
+Given = Flight | str | Path
+_ALLOWED = "two or more flights or paths of flight files, in a list or, with labels, as {'label': flight}"
+
+
+@final
+class Comparison:
+    """Several flights side by side; prints as a table.
+
+    Attributes
+    ----------
+    flights : dict of str to Flight
+        By the label that tells each from the others.
+    """
+
+    def __init__(self, flights: dict[str, Flight]) -> None:
+        self.flights = flights
+
+    def __len__(self) -> int:
+        return len(self.flights)
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{cut(label)} ({flight.outcome.kind})" for label, flight in self.flights.items())
+        return cut(f"<comparison of {len(self)} flights: {told}>", LONGEST)
+
+    def __str__(self) -> str:
+        file = io.StringIO()
+        Console(file=file, width=terminal_width(), color_system=None).print(self)
+        return file.getvalue().rstrip("\n")
+
+    def __rich__(self) -> Table:
+        """The table for terminals, in which long texts are folded."""
+        header, *lines = self.rows()
+        # As `Text`, for rich would take what stands in brackets in a name for markup.
+        table = Table(title=Text(one_line(self.title)))
+        for text in header:
+            table.add_column(Text(one_line(text)), overflow="fold")
+        for line in lines:
+            table.add_row(*(Text(one_line(text)) for text in line))
+        table.caption = self._note or None
+        return table
+
+    def _repr_html_(self) -> str:
+        """The table for notebooks."""
+        header, *lines = self.rows()
+        return html_table(lines, header, self.title) + (html_note(self._note) if self._note else "")
+
+    @property
+    def title(self) -> str:
+        """Scenarios of the flights."""
+        return ", ".join(dict.fromkeys(flight.scenario_name for flight in self.flights.values()))
+
+    @property
+    def _note(self) -> str:
+        if all(flight.outcome.survived for flight in self.flights.values()):
+            return ""
+        return f"{UNTIL_LOST} of a flight that was lost: over the time before, not to be compared"
+
+    def rows(self) -> list[list[str]]:
+        """The table as texts: a header with the labels, then a row per quantity."""
+        return comparison({label: flight.summary() for label, flight in self.flights.items()})
+
+    @property
+    def table(self) -> ScoreTable:
+        """All numbers, a row per flight; its first columns are ``flight``, the label, and ``scenario``.
+
+        Other columns are those of `Flights.table`, NaN where a flight has no such number.
+        """
+        flights = self.flights
+        names = dict.fromkeys(name for flight in flights.values() for name in flight.scores)
+        columns = {name: [flight.scores.get(name) for flight in flights.values()] for name in names}
+        about = {
+            "flight": np.array(list(flights)),
+            "scenario": np.array([flight.scenario_name for flight in flights.values()]),
+        }
+        return ScoreTable(about | {name: _column(values) for name, values in columns.items()})
+
+    def plot(self) -> dict[str, Figure]:
+        """Figures with all flights together, as matplotlib figures by name: position, attitude, rotor_speeds, ..."""
+        # matplotlib takes a second to load, which a table need not spend.
+        from rotorfault.report import figures
+
+        return figures.draw({label: flight.data for label, flight in self.flights.items()})
+
+    def save_plots(self, folder: str | Path) -> list[Path]:
+        """Write the figures of `plot` into a folder; their paths.
+
+        Parameters
+        ----------
+        folder : str or Path
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written.
+        """
+        from rotorfault.report import figures
+
+        return figures.save(self.plot(), Path(folder))
+
+
+def compare(*flights: Given | Sequence[Given] | Mapping[str, Given]) -> Comparison:
+    """Put flights side by side, as the command ``rotorfault compare`` does.
+
+    Parameters
+    ----------
+    *flights : Flight, str or Path; or one list or mapping of them
+        Flights, or paths of flight files; two or more. The keys of a mapping are their labels. Others are called by
+        their controller, with folder or scenario, and at last a number, where that does not tell them apart.
+
+    Returns
+    -------
+    Comparison
+        Prints as a table; ``.table`` has its numbers, ``.plot()`` its figures.
+
+    Raises
+    ------
+    InputError
+        If they are no flights, fewer than two, or a file cannot be read.
+    """
+    given: Any = flights[0] if len(flights) == 1 and not isinstance(flights[0], (str, Path, Flight)) else flights
+    if isinstance(given, Mapping):
+        if not all(isinstance(label, str) for label in given):
+            raise InputError(f"compare: got {short(list(given))} as labels; allowed: texts")
+        return Comparison(_two(dict(zip(given, _loaded(list(given.values())), strict=True))))
+    if not isinstance(given, (list, tuple)):
+        raise InputError(f"compare: got {short(given)}; allowed: {_ALLOWED}")
+    loaded = _loaded(given)
+    return Comparison(_two(dict(zip(_labels(given, loaded), loaded, strict=True))))
+
+
+def _two(flights: dict[str, Flight]) -> dict[str, Flight]:
+    if len(flights) < 2:
+        raise InputError(f"compare: got {len(flights)} flight; allowed: {_ALLOWED}")
+    return flights
+
+
+def _loaded(given: Sequence[Any]) -> list[Flight]:
+    for one in given:
+        if not isinstance(one, (Flight, str, Path)):
+            raise InputError(f"compare: got {short(one)}; allowed: {_ALLOWED}")
+    return [one if isinstance(one, Flight) else load(one) for one in given]
+
+
+def _labels(given: Sequence[Given], flights: Sequence[Flight]) -> list[str]:
+    """Labels that tell flights apart: the controller, with folder or scenario where that is not enough."""
+    labels = [flight.label for flight in flights]
     if len(set(labels)) < len(labels):
-        labels = [f"{label} ({path.resolve().parent.name})" for label, path in zip(labels, paths, strict=True)]
+        places = [
+            flight.scenario_name if isinstance(one, Flight) else Path(one).resolve().parent.name
+            for one, flight in zip(given, flights, strict=True)
+        ]
+        labels = [f"{label} ({place})" for label, place in zip(labels, places, strict=True)]
     if len(set(labels)) < len(labels):
         labels = [f"{label} {number}" for number, label in enumerate(labels, start=1)]
-    return dict(zip(labels, loaded, strict=True))
+    return labels
 
 
-def print_table(flights: dict[str, Flight]) -> None:
-    """Print the numbers of all flights, a column each."""
-    header, *lines = comparison({label: flight.summary() for label, flight in flights.items()})
-    names = dict.fromkeys(str(f.data.attrs["scenario"]) for f in flights.values())
-    # As `Text`, for rich would take what stands in brackets in a name for markup.
-    table = Table(title=Text(one_line(", ".join(names))))
-    for text in header:
-        table.add_column(Text(one_line(text)), overflow="fold")
-    for line in lines:
-        table.add_row(*(Text(one_line(text)) for text in line))
-    if any(not flight.outcome.survived for flight in flights.values()):
-        table.caption = f"{UNTIL_LOST} of a flight that was lost: over the time before, not to be compared"
-    Console().print(table)
-
-
-def draw(flights: dict[str, Flight], folder: Path) -> list[Path]:
-    """Draw all flights together into a folder."""
-    return figures.save(figures.draw({label: flight.data for label, flight in flights.items()}), folder)
+def _column(values: list[Any]) -> Any:
+    """A column of numbers with NaN where there is none, or of texts."""
+    known = [value for value in values if value is not None]
+    if known and all(isinstance(value, (str, bool)) for value in known) and len(known) == len(values):
+        return np.array(values)
+    return np.array([np.nan if value is None else value for value in values])

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 from rotorfault.base.files import alone_in, output_folder, write_atomically
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.results.export import write_csv
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
 from rotorfault.results.score_table import nested
 from rotorfault.results.seal import sealed
-from rotorfault.results.text import summary_text
+from rotorfault.results.text import rows, summary_text
 from rotorfault.results.whole import require_whole
 from rotorfault.scenario.scenario import Scenario
 
@@ -26,8 +28,19 @@ if TYPE_CHECKING:
 class Summary(dict[str, Any]):
     """Numbers of a flight; prints readably."""
 
+    def __repr__(self) -> str:
+        about = {"scenario": "a flight", "controller": "?", "outcome": "?"} | self
+        scenario, by, outcome = (cut(str(about[key])) for key in ("scenario", "controller", "outcome"))
+        return cut(f"<summary of {scenario} by {by}: {outcome}>", LONGEST)
+
     def __str__(self) -> str:
         return summary_text(self)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        head, *_ = (text := summary_text(self)).splitlines()
+        lost = "" if self["survived"] else html_note(text.splitlines()[1].strip())
+        return html_table(rows(self), title=head) + lost
 
 
 @final
@@ -54,7 +67,7 @@ class Flight:
         self._data, self.outcome, self.scores, self.scenario = data, outcome, scores, scenario
 
     def __repr__(self) -> str:
-        return f"<flight of {self._data.attrs['scenario']} by {self.label}: {self.outcome}>"
+        return cut(f"<flight of {cut(self._data.attrs['scenario'])} by {cut(self.label)}: {self.outcome}>", LONGEST)
 
     @property
     def data(self) -> xr.Dataset:
@@ -75,6 +88,15 @@ class Flight:
         """Controller and preset, to tell flights of one scenario apart."""
         controller, preset = (str(self._data.attrs.get(name, "")) for name in ("controller", "preset"))
         return f"{controller} ({preset})" if preset else controller
+
+    @property
+    def scenario_name(self) -> str:
+        """Name of what was flown."""
+        return str(self._data.attrs["scenario"])
+
+    def _repr_html_(self) -> str:
+        """The summary as a table, for notebooks."""
+        return self.summary()._repr_html_()
 
     def summary(self) -> Summary:
         """All numbers of the flight; see `rotorfault.loop.scoring` for their definitions.

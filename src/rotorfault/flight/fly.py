@@ -34,7 +34,7 @@ from rotorfault.results.score_table import score_table
 from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import NO_PRESET
-from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
+from rotorfault.scenario.scenario import Scenario, allowed_with, scenario_from
 from rotorfault.scenario.slots import SLOTS
 
 
@@ -158,8 +158,8 @@ def prepare(
     tables = scenario.as_tables() if isinstance(scenario, Scenario) else copy.deepcopy(dict(scenario))
     override_all(tables, overrides)
     # What is in a checked scenario was allowed when it was checked.
-    allowed = isinstance(scenario, Scenario) or allow_code
-    return scenario_from(tables, as_text(tables.get("name", "scenario")), allowed or named_places(overrides))
+    allowed = allowed_with(isinstance(scenario, Scenario) or allow_code, overrides)
+    return scenario_from(tables, as_text(tables.get("name", "scenario")), allowed)
 
 
 def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = False) -> Flight:

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from rotorfault.base.bounds import positive, require, thread_count
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.html import html_note, html_table
+from rotorfault.base.one_line import LONGEST, brief, cut
 from rotorfault.base.progress import Bar
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch
@@ -73,7 +75,16 @@ class Flights:
 
     def __repr__(self) -> str:
         counted = ", ".join(f"{count} {kind}" for kind, count in self.table.count().items())
-        return f"<{len(self)} flights of {self.scenario.name}: {counted}>"
+        return cut(f"<{len(self)} flights of {cut(self.scenario.name)}: {counted}>", LONGEST)
+
+    def _repr_html_(self) -> str:
+        """How many ended how, and what was varied, as a table for notebooks."""
+        share = [
+            (kind, f"{count:,}", f"{100.0 * count / len(self):.3g} %") for kind, count in self.table.count().items()
+        ]
+        varied = "; ".join(f"{key} {_range(column)}" for key, column in self.varied.items())
+        title = f"{len(self):,} flights of {self.scenario.name}"
+        return html_table(share, ("outcome", "flights", "share"), title) + html_note(f"varied: {varied}")
 
     def settings(self, index: int) -> dict[str, Any]:
         """What one of the flights had in place of the scenario's values."""
@@ -223,6 +234,13 @@ def _settling_within(batch: Batch, within: float) -> Batch:
     band = Vec3(within, within, within)
     scoring = batch.parameters.scoring._replace(settle_band=band)
     return batch._replace(parameters=batch.parameters._replace(scoring=scoring))
+
+
+def _range(column: NDArray[Any]) -> str:
+    """Values of a column in a few words."""
+    if column.dtype.kind in "iuf" and len(column):
+        return f"{column.min():g} to {column.max():g}"
+    return brief(list(dict.fromkeys(map(str, column.tolist()))))
 
 
 def _watch(bar: Bar, before: float, batch: Batch, duration: float) -> Any:

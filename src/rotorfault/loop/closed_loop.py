@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar, cast, final
 
 from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
 from rotorfault.autopilot.response.protocol import ON_FAULT
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.loop.recorded import Recorder
 from rotorfault.loop.scores import Scores, ScoringParameters, unjudged
 from rotorfault.loop.scoring import Scoring
@@ -98,6 +99,10 @@ class ClosedLoop:
     layout : Layout
         Names, units and rows of what is recorded.
     """
+
+    def __repr__(self) -> str:
+        parts = ", ".join(f"{slot.name} {type(part).__name__}" for slot, part in self.each())
+        return cut(f"<closed loop of {parts}>", LONGEST)
 
     def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing) -> None:
         self.parts = dict(parts)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, overload
 
+from rotorfault.base.one_line import brief
 from rotorfault.maths.scalar import Scalar, reciprocal, sqrt
 
 
@@ -26,7 +27,9 @@ class Value:
         return (getattr(self, name) for name in self.__slots__)
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__slots__)
+        # Numbers with all their digits, arrays by their shape.
+        texts = [repr(value) if isinstance(value, float) else brief(value) for value in self]
+        inside = ", ".join(f"{name}={text}" for name, text in zip(self.__slots__, texts, strict=True))
         return f"{type(self).__name__}({inside})"
 
     def __eq__(self, other: object) -> bool:

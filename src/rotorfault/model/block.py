@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar, cast
 
 from rotorfault.base.config import Strict
+from rotorfault.base.one_line import in_a_line, record_line
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.vehicle import Vehicle
 
@@ -30,12 +31,18 @@ class Context(NamedTuple):
     vehicle: Vehicle  # the true one for parts of the truth, the believed one for parts of the autopilot
     period: float  # s, sampling period
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class TimeGrid(NamedTuple):
     """The instants at which a flight is computed."""
 
     period: float  # s, between sampling instants
     step: float  # s, between two instants of the integration
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Nothing(NamedTuple):
@@ -76,6 +83,11 @@ class Block(Generic[InputsT, OutputT, MemoryT, ParametersT]):
     def __init__(self, settings: Any = None) -> None:
         # Of the part's own class of settings, which a type parameter more would name at every use.
         self.settings: Any = self.Settings() if settings is None else settings
+
+    def __repr__(self) -> str:
+        settings = getattr(self, "settings", None)  # a part of a user's may have none
+        fields = type(settings).model_fields if isinstance(settings, Strict) else {}
+        return in_a_line(type(self).__name__, ((key, getattr(settings, key, None)) for key in fields))
 
     def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
         """Why a time grid cannot carry this part of the truth or task, if `limits_grid`; None if it can.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Generic, NamedTuple, TypeVar
 
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
@@ -24,6 +25,9 @@ class Wrench(NamedTuple):
     thrust: Scalar  # N
     torque_B: Vec3  # N m: roll, pitch, yaw
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class State(NamedTuple):
     """The true motion of the body at one time."""
@@ -33,6 +37,9 @@ class State(NamedTuple):
     q_WB: Quat  # unit quaternion, body to world
     omega_B: Vec3  # rad/s; Euler rates where the plant is `paper_model`, which identifies the two
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Reading(NamedTuple, Generic[T]):
     """What one sensor gives at a sampling instant."""
@@ -40,6 +47,9 @@ class Reading(NamedTuple, Generic[T]):
     value: T
     valid: Scalar = 1.0  # 1 where there is a value, else 0
     age: Scalar = 0.0  # s since it was measured
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 Absent = tuple[()]
@@ -55,6 +65,9 @@ class Readings(NamedTuple):
     rates: Reading[Vec3] | Absent = ()  # rad/s, B
     specific_force: Reading[Vec3] | Absent = ()  # m/s^2, B: acceleration less gravity, at the centre of mass
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Estimate(NamedTuple):
     """What the estimator believes at one sampling instant."""
@@ -65,6 +78,9 @@ class Estimate(NamedTuple):
     omega_B: Vec3  # rad/s
     specific_force_B: Vec3 = zeros()  # m/s^2: acceleration less gravity
     wind_W: Vec3 | Absent = ()  # m/s, of the air over ground, where the estimator knows it
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
     @property
     def attitude(self) -> Vec3:
@@ -78,6 +94,9 @@ class Motion(NamedTuple):
     v_W: Vec3  # m/s
     omega_B: Vec3  # rad/s
     axis_W: Vec3  # unit vector of the thrust
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 def motion_of(estimate: Estimate) -> Motion:
@@ -95,6 +114,9 @@ class Reference(NamedTuple):
     yaw_rate: Scalar  # rad/s
     yaw_acceleration: Scalar  # rad/s^2
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Diagnosis(NamedTuple):
     """The autopilot's belief about the rotors."""
@@ -105,6 +127,9 @@ class Diagnosis(NamedTuple):
     residual: PerRotor  # N: estimated thrust less the thrust that a healthy rotor would give
     test: PerRotor = PerRotor.all(0.0)  # N: least thrust of a sound rotor to command, to see whether it gives any
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Command(NamedTuple):
     """What the autopilot sends out for one sampling period."""
@@ -113,6 +138,9 @@ class Command(NamedTuple):
     # Unphysical: acts on x and y directly; zero unless the option `six_inputs` is on (see docs/paper.md).
     direct_acceleration_W: Vec3  # m/s^2
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Allocation(NamedTuple):
     """How a demanded wrench was turned into rotor thrusts, and what could not be given."""
@@ -120,6 +148,9 @@ class Allocation(NamedTuple):
     command: PerRotor  # N per rotor, within the rotor limits
     unallocated: Wrench  # demanded wrench less the wrench that the believed rotors give
     given_up: Vec3  # indicators 1/0: (tilt torque cut, thrust cut, yaw torque cut)
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 def healthy() -> Diagnosis:

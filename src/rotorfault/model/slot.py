@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final, Generic, Literal, TypeVar, cast, final
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.registry import Kind, Registry
 from rotorfault.model.block import Nothing, Record
 
@@ -140,7 +141,7 @@ class Slot(Generic[B]):
         return cast("Kind[B]", part)
 
     def __repr__(self) -> str:
-        return f"<slot {self.name}: {', '.join(self.registry)}>"
+        return cut(f"<slot {self.name}: {', '.join(self.registry)}>", LONGEST)
 
 
 Part = TypeVar("Part", bound=type[Any])

@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any, Literal, NamedTuple, final, get_args, get_type_hints
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.records import leaf_names
 from rotorfault.maths.rotation import Quat
@@ -34,6 +35,9 @@ class Quantity(NamedTuple):
     frame: str
     meaning: str
     score: Score | None = None  # its largest value, or the share of sampling instants at which it is above 0.5
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 Q = Quantity
@@ -55,6 +59,9 @@ class Signal(NamedTuple):
     name: str  # dotted: "position", or "controller.sigma_position"
     kind: Any  # one of `KINDS`
     quantity: Quantity
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 @lru_cache(maxsize=256)
@@ -116,6 +123,9 @@ class Layout:
             width = len(leaf_names(KINDS[signal.kind]))
             self._starts[signal.name] = slice(first, first + width)
             first += width
+
+    def __repr__(self) -> str:
+        return f"<layout of {len(self.signals)} signals in {len(self.rows)} rows>"
 
     def __len__(self) -> int:
         return len(self.rows)

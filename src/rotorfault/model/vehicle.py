@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.signals import Wrench
@@ -37,6 +38,9 @@ class Vehicle(NamedTuple):
     linear_drag: Scalar  # N s/m, force per speed relative to the air (k_d)
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:

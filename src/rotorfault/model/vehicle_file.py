@@ -28,6 +28,7 @@ from pydantic_core import PydanticCustomError
 from rotorfault.base.bounds import require
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.one_line import cut
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle
 
@@ -114,6 +115,9 @@ class VehicleFile(Strict):
             if error is not None:
                 raise error
         return self
+
+    def __repr__(self) -> str:
+        return f"<vehicle {cut(self.name)}: {self.mass.value:g} kg, thrust-to-weight {self.thrust_to_weight:.3g}>"
 
     def with_factors(self, factors: Mapping[str, float]) -> VehicleFile:
         """The same vehicle with some numbers times factors; it keeps the rules of a file that say what can exist.

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, final
 from pydantic import Field, model_validator
 
 from rotorfault.base.config import Strict, refusal
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import (
     Scalar,
@@ -45,9 +46,7 @@ class RotorFault(NamedTuple):
     """State of the four rotors at one time."""
 
     effectiveness: PerRotor  # 1 sound .. 0 dead
-    stuck: (
-        PerRotor  # 1 where the rotor does not follow its command; over a step, the share of it in which it does not
-    )
+    stuck: PerRotor  # 1 where the rotor does not follow its command; over a step, the share in which it does not
     stuck_thrust: PerRotor  # N, delivered where stuck, times that share
 
 
@@ -57,6 +56,9 @@ class Effect(NamedTuple):
     effectiveness: Scalar = 1.0  # what it leaves of the thrust
     stuck: Scalar = 0.0  # 1 where the rotor does not follow its command; over a step, the share in which it does not
     stuck_thrust: Scalar = 0.0  # N, delivered then
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class OneRotor(Strict):

@@ -28,6 +28,7 @@ from pydantic import Field
 
 from rotorfault.base.config import Strict
 from rotorfault.base.number_rule import plain_number
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar, maximum, sqrt
 from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, TimeGrid
@@ -44,6 +45,9 @@ class Contact(NamedTuple):
     force_W: Vec3  # N
     torque_B: Vec3  # N m
     normal: Scalar  # N, vertical part of the force
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Ground(Block[State, Contact, MemoryT, ParametersT]):

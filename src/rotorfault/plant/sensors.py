@@ -13,6 +13,7 @@ from pydantic import Field
 
 from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, Radians
 from rotorfault.base.config import Strict
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
@@ -28,6 +29,9 @@ class SensorInputs(NamedTuple):
     state: State
     specific_force_B: Vec3  # m/s^2: acceleration less gravity of the centre of mass, as an accelerometer feels it
     normals: tuple[Scalar, ...] = ()  # independent standard normal numbers, as many as the part says it needs
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):

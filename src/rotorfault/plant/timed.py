@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.scalar import Scalar, clip
 from rotorfault.model.block import Block, MemoryT, Nothing, OutputT, ParametersT, Record
 
@@ -20,6 +21,9 @@ class TimeInputs(NamedTuple):
 
     time: Scalar  # s since the start of the flight
     normals: tuple[Scalar, ...] = ()  # independent standard normal numbers, as many as the part says it needs
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Timed(Block[TimeInputs, OutputT, MemoryT, ParametersT]):

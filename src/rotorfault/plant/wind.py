@@ -14,6 +14,7 @@ from typing import NamedTuple, final
 from pydantic import Field
 
 from rotorfault.base.config import Strict
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, sin
 from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT
@@ -26,6 +27,9 @@ class Air(NamedTuple):
 
     velocity_W: Vec3  # m/s, over ground; acts through drag
     acceleration_W: Vec3  # m/s^2, disturbance that acts directly, whatever the vehicle's velocity
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Wind(Timed[Air, MemoryT, ParametersT]):

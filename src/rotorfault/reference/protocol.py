@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
 from rotorfault.model.block import Block, Nothing, Record
@@ -21,6 +22,9 @@ class ReferenceTable(NamedTuple):
     yaw: Array  # (n,) rad
     yaw_rate: Array  # (n,) rad/s
     yaw_acceleration: Array  # (n,) rad/s^2
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
     def at(self, rows: Any) -> Reference:
         """The reference at one row, as scalars, or at several, as arrays."""

@@ -25,12 +25,14 @@ angle or rotor:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, final
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base import frames
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.engine.batch import Batch, columns
 from rotorfault.loop.closed_loop import LoopState, no_reference
 from rotorfault.loop.scores import ENDS, INTERRUPTED, SURVIVED, YAW_KEPT, Scores, ScoringParameters
@@ -38,6 +40,11 @@ from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.arrays import ANGLES, AXES, Array
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.telemetry import Signal
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
 
 GIVEN_UP = ("tilt", "thrust", "yaw")
 ROTORS = ("1", "2", "3", "4")
@@ -51,7 +58,9 @@ Columns = dict[str, NDArray[Any]]
 
 @final
 class ScoreTable:
-    """Numbers of many flights.
+    """Numbers of many flights, for NumPy by column (``table["cost"]``), for pandas, polars and Arrow as a whole.
+
+    ``pandas.DataFrame(table)``, ``polars.DataFrame(table)`` and ``pyarrow.table(table)`` take it as it is.
 
     Attributes
     ----------
@@ -65,11 +74,41 @@ class ScoreTable:
     def __len__(self) -> int:
         return len(self.columns["outcome"])
 
+    def __repr__(self) -> str:
+        counted = ", ".join(f"{count} {kind}" for kind, count in self.count().items())
+        return cut(f"<scores of {len(self)} flights: {counted}; {len(self.columns)} columns>", LONGEST)
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self.columns[name]
 
     def __contains__(self, name: object) -> bool:
         return name in self.columns
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return frames.rows(self.columns)
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """The table for polars, pyarrow and whatever else speaks the protocol of Arrow."""
+        stream: object = self.to_arrow().__arrow_c_stream__(requested_schema)
+        return stream
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The table as a pandas DataFrame, a row per flight.
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        return frames.to_pandas(self.columns)
+
+    def to_polars(self) -> pl.DataFrame:
+        """The table as a polars DataFrame, a row per flight."""
+        return frames.to_polars(self.columns)
+
+    def to_arrow(self) -> pa.Table:
+        """The table as a pyarrow Table, a row per flight."""
+        return frames.to_arrow(self.columns)
 
     def row(self, index: int) -> dict[str, Any]:
         """The numbers of one flight."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.foreign import is_place
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.preset_file import beside
-from rotorfault.scenario.scenario import Scenario, named_places, scenario_from
+from rotorfault.scenario.scenario import Scenario, allowed_with, scenario_from
 from rotorfault.scenario.slots import SLOTS
 
 
@@ -24,7 +24,10 @@ def scenario_names() -> list[str]:
 
 
 def load_scenario(
-    name_or_path: str | Path, overrides: Mapping[str, Any] | None = None, *, allow_code: bool = False
+    name_or_path: str | Path,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    allow_code: bool | Collection[str] = False,
 ) -> Scenario:
     """Load and check a scenario.
 
@@ -34,8 +37,8 @@ def load_scenario(
         Name of a built-in scenario, or a path that ends in ``.toml``. Paths in a file are relative to it.
     overrides : mapping, optional
         Dotted keys and their values, such as ``{"wind.kind": "none", "fault.0.loss": 0.3}``.
-    allow_code : bool
-        Whether code that the scenario names may run; code that the overrides name may.
+    allow_code : bool or collection of str
+        Whether code that the scenario names may run, or which of it; code that the overrides name may.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def load_scenario(
     if folder is not None:
         _relative_to(folder, tables)
     override_all(tables, overrides or {})
-    return scenario_from(tables, where, allow_code or named_places(overrides or {}))
+    return scenario_from(tables, where, allowed_with(allow_code, overrides or {}))
 
 
 def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
@@ -81,6 +84,19 @@ def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
 def is_file(kind: object) -> bool:
     """Whether a part or a function is named by a place in a file, ``FILE.py:NAME``."""
     return isinstance(kind, str) and is_place(kind) and kind.rpartition(":")[0].endswith(".py")
+
+
+def with_whole_paths(value: Any) -> Any:
+    """The same value, a name, a table or a list, with the whole path at each place in a file, wherever in it.
+
+    So what is kept can be flown again from any folder.
+    """
+    if is_file(value):
+        file, _, name = str(value).rpartition(":")
+        return f"{Path(file).resolve()}:{name}"
+    if isinstance(value, Mapping):
+        return {key: with_whole_paths(inner) for key, inner in value.items()}
+    return [with_whole_paths(inner) for inner in value] if isinstance(value, (list, tuple)) else value
 
 
 def new_scenario(name: str) -> str:

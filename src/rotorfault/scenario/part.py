@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from rotorfault.base import foreign
 from rotorfault.base.config import Strict, in_words, passed_on, refusal
 from rotorfault.base.errors import InputError, as_text, choices, short, unknown
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.registry import Kind
 from rotorfault.model.slot import Slot
 from rotorfault.scenario.preset_file import is_preset_file, label_of, preset_from_file
@@ -47,7 +48,7 @@ class Part(Generic[B]):
 
     def __repr__(self) -> str:
         preset = f", preset {self.preset_label}" if self.preset else ""
-        return f"<{self.slot.registry.sort} {self.kind}{preset}>"
+        return cut(f"<{self.slot.registry.sort} {self.kind}{preset}>", LONGEST)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Part) and self.as_table() == other.as_table()

@@ -55,7 +55,7 @@ def preset_from_file(slot: Slot[Any], kind: str, preset: str) -> Mapping[str, An
     """
     path, name, table = _table(preset)
     made_for = record_in_file(preset).get(slot.name)
-    if made_for is not None and _name(as_text(made_for)) != _name(kind):
+    if made_for is not None and name_of(as_text(made_for)) != name_of(kind):
         raise InputError(
             f"{path}: preset '{name}' is one of {slot.registry.sort} '{as_text(made_for)}', not of '{kind}'; "
             f"give the {slot.registry.sort} that it is for too"
@@ -105,6 +105,6 @@ def _parts(preset: str) -> tuple[str, str]:
     return (path + ENDING, name) if ending else (preset, "")
 
 
-def _name(kind: str) -> str:
+def name_of(kind: str) -> str:
     """Name of a part, without the place in code where it is from."""
     return kind.rpartition(":")[2]

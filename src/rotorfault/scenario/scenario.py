@@ -22,6 +22,7 @@ from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, TURN, Radians
 from rotorfault.base.config import Strict, Three, passed_on, refusal, validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
+from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
@@ -130,6 +131,11 @@ class Scenario(Strict):
     seed: int = Field(default=0, ge=0, le=MOST_SEED, description="names the random numbers of sensor noise and gusts")
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
+
+    def __repr__(self) -> str:
+        shown = [(s, part) for s, part in self.parts() if s.presets is not None or part.kind != s.default]
+        parts = ", ".join(f"{slot.name} {part.kind}" for slot, part in shown)
+        return cut(f"<scenario {cut(self.name)}: {self.duration:g} s of {cut(self.vehicle.name)}; {parts}>", LONGEST)
 
     def __getitem__(self, slot: Slot[B]) -> Part[B]:
         """The part of a slot that has one."""
@@ -306,3 +312,17 @@ def named_places(overrides: Mapping[str, Any]) -> frozenset[str]:
                 yield from places(inner)
 
     return frozenset(places(overrides))
+
+
+def allowed_with(allow: bool | Collection[str], overrides: Mapping[str, Any]) -> bool | Collection[str]:
+    """What code may run where a user has put values in place of a scenario's: what he has named himself, too.
+
+    Parameters
+    ----------
+    allow : bool or collection of str
+        Whether code may run besides, or which.
+    overrides : mapping
+    """
+    if isinstance(allow, bool):
+        return allow or named_places(overrides)
+    return frozenset(allow) | named_places(overrides)

@@ -14,7 +14,7 @@ from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.autopilot.estimation import ESTIMATOR
 from rotorfault.autopilot.response import ON_FAULT
 from rotorfault.base.errors import InputError, unknown
-from rotorfault.model.slot import Slot
+from rotorfault.model.slot import Slot, slot_of
 from rotorfault.plant import FAULT, GROUND, PLANT, SENSORS, WIND
 from rotorfault.reference import REFERENCE
 
@@ -26,6 +26,9 @@ class Slots:
     def __init__(self, slots: tuple[Slot[Any], ...]) -> None:
         self._slots = {slot.name: slot for slot in slots}
         self.version = 0  # rises with every change
+
+    def __repr__(self) -> str:
+        return f"<slots: {', '.join(self._slots)}>"
 
     def __iter__(self) -> Iterator[Slot[Any]]:
         return iter(self._slots.values())
@@ -47,6 +50,24 @@ class Slots:
         if name not in self._slots:
             raise InputError(unknown("kind of part", name, list(self._slots)))
         return self._slots[name]
+
+    def home_of(self, part: object) -> tuple[Slot[Any], Any]:
+        """Slot of a class of parts or of a part, and what makes parts of settings.
+
+        Parameters
+        ----------
+        part : object
+            A class, an object, or what a slot can adapt to one.
+
+        Raises
+        ------
+        InputError
+            If it is no kind of part.
+        """
+        for slot in self:
+            if slot.adapt is not None and (adapted := slot.adapt(part)) is not None:
+                return slot, adapted
+        return slot_of(part), part
 
     def insert(self, slot: Slot[Any], after: str) -> None:
         """Give a new kind of part its place, behind that of another.

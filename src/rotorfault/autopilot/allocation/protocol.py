@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from rotorfault.autopilot.instant import Instant
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
@@ -20,6 +21,9 @@ class AllocationInputs(NamedTuple):
     diagnosis: Diagnosis  # believed
     vehicle: Vehicle  # belief, with two opposite pairs of rotors (see `rotorfault.model.mixer`)
     command: PerRotor  # N, sent at the last instant
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Allocator(Block[AllocationInputs, Allocation, MemoryT, ParametersT]):

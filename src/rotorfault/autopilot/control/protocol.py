@@ -15,6 +15,7 @@ from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.autopilot.presets import presets
 from rotorfault.base.config import Strict
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, Record
@@ -37,6 +38,9 @@ class ControlInputs(NamedTuple):
     residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class ControlOutput(NamedTuple):
     """What a controller asks for."""
@@ -44,6 +48,9 @@ class ControlOutput(NamedTuple):
     demand: Wrench | PerRotor  # a wrench for the allocation, or commands of the rotors in N
     # Unphysical: acts on x and y directly; zero but for the option `six_inputs`.
     direct_acceleration_W: Vec3 = zeros()  # m/s^2
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):

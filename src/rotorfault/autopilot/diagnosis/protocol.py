@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Expectation
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, MemoryT, ParametersT
@@ -25,6 +26,9 @@ class DiagnosisInputs(NamedTuple):
     expectation: Expectation  # what sound rotors would have done over the last period
     command: PerRotor  # N, sent at the last instant
     vehicle: Vehicle  # belief
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Diagnoser(Block[DiagnosisInputs, Diagnosis, MemoryT, ParametersT]):

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from rotorfault.autopilot.instant import Instant
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Estimate, Reading, Readings
@@ -19,6 +20,9 @@ class EstimatorInputs(NamedTuple):
     readings: Readings
     vehicle: Vehicle  # belief
     command: PerRotor  # N, sent at the last instant
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Estimator(Block[EstimatorInputs, Estimate, MemoryT, ParametersT]):

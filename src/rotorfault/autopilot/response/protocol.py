@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 
 from rotorfault.autopilot.instant import Decision, Instant
 from rotorfault.autopilot.prediction import Expectation
+from rotorfault.base.one_line import record_line
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Diagnosis, Estimate, Reference
 from rotorfault.model.slot import Slot
@@ -20,6 +21,9 @@ class ResponseInputs(NamedTuple):
     diagnosis: Diagnosis
     expectation: Expectation  # what sound rotors would have done over the last period
     vehicle: Vehicle  # belief
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Response(Block[ResponseInputs, Decision, MemoryT, ParametersT]):

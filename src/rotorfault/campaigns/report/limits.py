@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.analysis.hover import hover_margin
+from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
-from rotorfault.campaigns.study import Draw, Study
+from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.batch import columns as rows_of
 from rotorfault.flight.assembly import Group, numbers_of
 from rotorfault.flight.sweep import checked_columns, groups_of
@@ -38,6 +40,9 @@ class Limits(NamedTuple):
 
     with_yaw: Array
     without_yaw: Array
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
 
 class Physics(NamedTuple):

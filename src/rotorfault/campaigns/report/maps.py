@@ -22,6 +22,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
+from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.campaigns.axes import AXES
 from rotorfault.campaigns.flight_set import Counts
 from rotorfault.campaigns.grades import GRADES
@@ -53,6 +54,9 @@ class View(NamedTuple):
     values: list[Any]
     order: Counts  # place of each value in the study
     numeric: bool
+
+    def __repr__(self) -> str:
+        return record_line(self)
 
     @property
     def positions(self) -> Array:
@@ -101,6 +105,9 @@ class VariantMap(NamedTuple):
     recovery_along: Array  # s, (probabilities, first)
     altitude_along: Array  # m, (probabilities, first)
 
+    def __repr__(self) -> str:
+        return f"<map of {self.label}: {self.cell.size:,} cells, {int(self.flights.sum()):,} flights>"
+
 
 class Pairing(NamedTuple):
     """First variant less second, on the flights that both flew, each array of the shape of the map."""
@@ -114,6 +121,9 @@ class Pairing(NamedTuple):
     first_apart: Counts  # number of the first flight in which only one was successful; -1 where there is none
     total: Difference  # over the whole map; of the first round
 
+    def __repr__(self) -> str:
+        return record_line(self)
+
 
 class Maps(NamedTuple):
     """All numbers of a campaign's pictures."""
@@ -126,6 +136,11 @@ class Maps(NamedTuple):
     left_out: int  # of rounds that are not complete
     compared: int  # cells that all variants have flown: those of the totals
     complete: bool  # whether sampling asks for no further flight
+
+    def __repr__(self) -> str:
+        axes, labels = ", ".join(view.name for view in self.views), ", ".join(one.label for one in self.variants)
+        about = f"{self.study.cells:,} cells ({axes}), variants {labels}, {self.flights:,} flights"
+        return cut(f"<maps of {cut(self.study.name)}: {about}>", LONGEST)
 
 
 class _Sample(NamedTuple):

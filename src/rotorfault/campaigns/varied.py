@@ -1,0 +1,87 @@
+"""What a study varies: values along an axis of its map, and quantities that are drawn for each flight."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rotorfault.base.config import Strict, refusal
+from rotorfault.base.errors import InputError
+from rotorfault.base.number_rule import short
+from rotorfault.campaigns.axes import axis, out_of_range
+
+
+class GridAxis(Strict):
+    """One axis of the map: values, or a number of them evenly spaced between two."""
+
+    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
+    values: tuple[float | str, ...] | None = Field(default=None, description="the values")
+    start: float | None = Field(default=None, description="first value")
+    stop: float | None = Field(default=None, description="last value")
+    count: int | None = Field(default=None, ge=2, le=10_000, description="how many")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> GridAxis:
+        _require_axis(self.name)
+        by_range = (self.start, self.stop, self.count)
+        if self.values is not None:
+            if any(part is not None for part in by_range):
+                raise refusal("values", "cannot stand beside start, stop and count; give one or the other")
+            if not self.values:
+                raise refusal("values", "is empty; give at least one value")
+            if len(set(self.values)) < len(self.values):
+                raise refusal("values", f"has values twice: {list(self.values)}; give each once")
+        elif self.start is None or self.stop is None or self.count is None:
+            raise refusal("values", "is missing; give values, or start, stop and count")
+        elif not self.start < self.stop:
+            raise refusal("stop", f"got {self.stop:g}, an empty range; allowed: above start = {self.start:g}")
+        if len({isinstance(value, str) for value in self.grid}) > 1:
+            raise refusal("values", f"has numbers and texts: {short(list(self.grid))}; allowed: one or the other")
+        if wrong := out_of_range(self.name, self.grid):
+            raise refusal("values", wrong)
+        return self
+
+    @property
+    def grid(self) -> list[float | str]:
+        """The values in order."""
+        if self.values is not None:
+            return list(self.values)
+        start, stop, count = self.start or 0.0, self.stop or 0.0, self.count or 0
+        return [round(float(v), 12) for v in np.linspace(start, stop, count)]
+
+
+class Draw(Strict):
+    """A quantity that is drawn for each flight: uniform between two values, normal, or one of some values."""
+
+    name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
+    uniform: tuple[float, float] | None = Field(default=None, description="least and largest value")
+    normal: tuple[float, float] | None = Field(
+        default=None, description="mean and standard deviation; cut at the range of the axis"
+    )
+    choice: tuple[float | str, ...] | None = Field(default=None, description="values, equally likely")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Draw:
+        _require_axis(self.name)
+        if sum(part is not None for part in (self.uniform, self.normal, self.choice)) != 1:
+            raise refusal("", "give one of uniform, normal and choice")
+        if self.uniform is not None and not self.uniform[0] < self.uniform[1]:
+            raise refusal("uniform", f"got {list(self.uniform)}, an empty range; allowed: [least, largest]")
+        if self.normal is not None and not self.normal[1] > 0.0:
+            raise refusal("normal", f"got {list(self.normal)}; allowed: [mean, deviation above 0]")
+        if self.choice is not None and not self.choice:
+            raise refusal("choice", "is empty; give at least one value")
+        if len({isinstance(value, str) for value in self.choice or ()}) > 1:
+            raise refusal(
+                "choice", f"has numbers and texts: {short(list(self.choice or ()))}; allowed: one or the other"
+            )
+        if wrong := out_of_range(self.name, (*(self.uniform or ()), *(self.choice or ()))):
+            raise refusal("", wrong)
+        return self
+
+
+def _require_axis(name: str) -> None:
+    try:
+        axis(name)
+    except InputError as error:
+        raise refusal("name", str(error)) from None
