@@ -51,13 +51,16 @@ EFFORT_WEIGHT = 0.04
 # Of the change of commands in a sampling period, as a share of hover thrust: up to three quarters of what `fly` calls
 # rattling (`rotorfault.loop.scores.RATTLING`) are free, so that a flight noisier than those searched on stays below.
 QUIET_FREE = 0.75 * RATTLING
-QUIET_WEIGHT = 5.0  # s per percent beyond: two percent too much are as bad as a lost flight, so that it is a limit
+QUIET_WEIGHT = 5.0  # s per percent beyond: as much as anything else comes to, so that it is a limit
+LOST_QUIET = 60.0  # s: more than commands that change by 13 %; no flight is worth losing for being quiet
 # Per span of a reference that moves, where `TRACKING_WEIGHT` has none: a tenth of the span behind it counts as 1 s.
 TRACKING_SHARE = 10.0
 MISSED = 0.05  # loss from which on a rotor that no flag names at the end is missed; the diagnosis finds 0.1
 # What pages say of them: value, unit, reason. The comments above say the same in more words.
 WEIGHTS: tuple[tuple[str, float, str, str], ...] = (
     ("a lost flight", LOST, "s", "five times a tuned set-point flight: survival first, yet one of many hides none"),
+    ("a lost flight (`quiet`)", LOST_QUIET, "s",
+     "more than commands that change by 13 %: no flight is worth losing for being quiet"),
     ("time of a fault that interrupts the approach", INTERRUPTED, "1",
      "1 would ask for settling before the fault at any price, 0 would reward who waits for it"),
     ("excursion after the fault that is free", EXCURSION_FREE, "bands",
@@ -74,7 +77,7 @@ WEIGHTS: tuple[tuple[str, float, str, str], ...] = (
     ("rotor flagged wrongly, or missed", 1.0, "s", "as bad as settling a second later"),
     ("tilt beyond 1.1 rad", 1.0, "s/rad", "the largest tilt that may be demanded: more is a flight near its limit"),
     ("change of commands beyond 1.5 % of hover thrust in a sampling period (`quiet` alone)", QUIET_WEIGHT, "s per %",
-     "three quarters of what counts as rattling are free; two percent too much are as bad as a lost flight"),
+     "three quarters of what counts as rattling are free; a percent too much costs more than slow settling"),
     ("effort, on log10(1 + mean square angular acceleration)", EFFORT_WEIGHT, "s per decade",
      "settles between flights alike in all else, for the quieter one"),
 )  # fmt: skip
@@ -159,7 +162,7 @@ def without_cost(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]
 def quiet(scenario: Scenario, data: FlightData, scores: Mapping[str, Any]) -> float:
     """`balanced`, and no commands that rattle; for vehicles with real sensors."""
     if not scores["survived"]:
-        return LOST
+        return LOST_QUIET
     rattles = 100.0 * max(0.0, float(scores["command_step"]) - QUIET_FREE)
     return balanced(scenario, data, scores) + QUIET_WEIGHT * rattles
 
