@@ -3,7 +3,7 @@
 A page is one file that opens offline, so it holds its style itself: a template puts ``{{ style }}`` into its
 ``<style>`` element. The classes of `STYLE` that templates use:
 
-- ``scroll``: around a table that may be wider than the screen. It scrolls sideways alone, a shadow shows where more is.
+- ``scroll``: around a table that may be wider than the screen. It alone scrolls; a shadow shows where more is.
 - ``stacked``: a table whose rows become blocks below each other on a telephone. Its head is in a ``<thead>``, each
   cell has its column's title as ``data-label``; a cell of class ``first`` goes to the top of its block.
 - ``confirmed``, ``partly``, ``not``: colours of verdicts. ``n``: a cell of numbers. ``soft``: what is said aside.
@@ -17,7 +17,8 @@ from markupsafe import Markup
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de; --paper: #ffffff;
-  --tint: #f4f6f8; --link: #0060a0; --shade: rgba(27, 31, 36, .22); --yes: #00664a; --partly: #8a5a00; --no: #a33b00; }
+  --tint: #f4f6f8; --link: #0060a0; --shade: rgba(27, 31, 36, .22);
+  --yes: #00664a; --partly: #8a5a00; --no: #a33b00; }
 @media (prefers-color-scheme: dark) {
   :root { --ink: #e3e8ee; --soft: #a3adb8; --line: #3b444f; --paper: #14181d; --tint: #20262d; --link: #74b9ff;
     --shade: rgba(0, 0, 0, .65); --yes: #5fd3a6; --partly: #e3b341; --no: #ff9a68; }
