@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
 from rotorfault.maths.arrays import Array
-from rotorfault.report.panels import END, REFERENCE, Drawn, legend, sample
+from rotorfault.report.drawn import Drawn
+from rotorfault.report.marks import END, REFERENCE, legend, sample
 from rotorfault.report.style import BLACK, GREY, extremes, new_figure, span
 
 START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
