@@ -15,11 +15,12 @@ from rotorfault.autopilot.diagnosis.decision import SMALL_THRUST, second_best
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.report.drawn import Drawn, around_onsets, whole
 from rotorfault.report.marks import REFERENCE, keep_ends_inside, legend, sample
-from rotorfault.report.panels import Column, Curve, Panel, core_of, dashed, grid, solid, spans
+from rotorfault.report.panels import Column, Curve, Panel, core_of, dashed, grid, note_cut, solid, spans
 from rotorfault.report.style import BLACK, GREY, ORANGE, new_figure, padded, span
 
-THRESHOLD: dict[str, Any] = {"linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.9, "zorder": 2.4}
-IN_FORCE = "diagnosis.threshold"  # N, of diagnoses that have one
+THRESHOLD: dict[str, Any] = {"linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.8, "zorder": 1.9}
+IN_FORCE = "thrust_threshold"  # N, of diagnoses that record one
+SEEN = 0.02  # estimated loss below which there is nothing to see
 SHADE, STRIP = 0.16, 0.6  # opacity where a fault is declared: of the whole panel, of a strip at its top
 BEFORE, AFTER = 0.05, 0.25  # s around the onsets that the detail shows
 HEIGHT = 2.75  # cm per rotor
@@ -32,15 +33,15 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure | None:
     diagnosis that estimates anything.
     """
     drawn = [_with_missing(flight) for flight in drawn]
-    losses = any(flight.moves("loss_estimated") for flight in drawn)
     residuals = any(flight.moves("thrust_residual") for flight in drawn)
-    if not losses and not residuals:
+    if not residuals and not any(flight.moves("loss_estimated") for flight in drawn):
         return None
-    losses = losses or any(flight.moves("loss_true") for flight in drawn)
+    estimated = span(flight.values("loss_estimated") for flight in drawn) or (0.0, 0.0)
+    losses = estimated[1] > SEEN or any(f.moves(name) for f in drawn for name in ("loss_true", "fault_flag"))
     rotors = [int(rotor) for rotor in drawn[0].data["rotor"].values]
     threshold = THRESHOLD | ({"color": ORANGE} if len(drawn) == 1 else {})
     # A rotor that gives too much, as a stuck one may, is suspected as well.
-    too_much = any((f.values("thrust_missing") < f.values("threshold_below")).any() for f in drawn)
+    too_much = any((f.values("thrust_missing") < -f.values(IN_FORCE)).any() for f in drawn if f.has(IN_FORCE))
     loss_panels, missing_panels = [], []
     for k, rotor in enumerate(rotors):
         limit = Curve("loss_threshold", k, threshold)
@@ -69,7 +70,7 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure | None:
             for axes in below:
                 axes.tick_params(labelleft=False)
     others: list[Any] = [sample("true loss", **REFERENCE)] if losses else []
-    if any(flight.shows(IN_FORCE) for flight in drawn):
+    if any(flight.shows("loss_threshold") for flight in drawn):
         others.append(sample("threshold in force", **{"color": BLACK} | threshold))
     if any(flight.moves("fault_flag") for flight in drawn):
         colour, strength = (drawn[0].colour, SHADE) if len(drawn) == 1 else (GREY, STRIP)
@@ -83,13 +84,18 @@ def _with_missing(flight: Drawn) -> Drawn:
     residual = flight.values("thrust_residual")
     sound = np.asarray(second_best(PerRotor.of(residual.T)))
     flight = flight.adding({"thrust_missing": sound[:, None] - residual}, "thrust_residual")
-    if not flight.has(IN_FORCE):
+    recorded = flight.data.get("diagnosis.threshold")
+    if recorded is None or recorded.dims != ("time", "rotor"):
+        return flight
+    if recorded.attrs.get("units") == "1":
+        return flight.adding({"loss_threshold": recorded.values}, "loss_estimated")
+    if recorded.attrs.get("units") != "N":
         return flight
     # The loss is estimated with the same denominator.
     least = SMALL_THRUST * float(flight.data.attrs.get("thrust_max", 0.0))
     thrust = np.maximum(flight.values("expected_thrust"), max(least, 1e-9))
-    flight = flight.adding({"threshold_below": -flight.values(IN_FORCE)}, IN_FORCE)
-    return flight.adding({"loss_threshold": flight.values(IN_FORCE) / thrust}, "loss_estimated")
+    flight = flight.adding({IN_FORCE: recorded.values, "threshold_below": -recorded.values}, "thrust_residual")
+    return flight.adding({"loss_threshold": recorded.values / thrust}, "loss_estimated")
 
 
 def _scale_losses(panels: Sequence[Axes], drawn: Sequence[Drawn]) -> None:
@@ -105,6 +111,9 @@ def _scale_missing(below: Sequence[Axes], panels: Sequence[Panel], drawn: Sequen
     core = [values for panel in panels for values in core_of(panel, drawn, whole(drawn))]
     low, high = span(core) or (0.0, 1.0)
     _rescale(below, *padded(low, max(high, _usual(drawn, IN_FORCE))))
+    for k, axes in enumerate(below):
+        if (everything := span(flight.values("thrust_missing", k) for flight in drawn)) is not None:
+            note_cut(axes, everything)
 
 
 def _usual(drawn: Sequence[Drawn], threshold: str) -> float:

@@ -6,6 +6,7 @@ What a diverging flight does near its end does not set the scale of a panel; how
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +46,7 @@ class Panel(NamedTuple):
     height: float = 1.0  # in proportion to the other panels of the figure
     onset_of: int | None = None  # the rotor whose fault onsets are marked; those of all rotors if None
     band: float | None = None  # half width of a band around zero, shaded
+    zero_too: bool = True  # whether it is drawn where its curves are zero throughout the window
 
 
 class Strip(NamedTuple):
@@ -121,7 +123,8 @@ def draw_strip(axes: Axes, strip: Strip, drawn: Sequence[Drawn], window: tuple[f
 def spans(flight: Drawn, on: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Start and length in s of each time during which an indicator is on."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]))).reshape(-1, 2)
-    time = np.append(flight.time, flight.end)
+    # The last record holds for a period.
+    time = np.append(flight.time, whole([flight])[1])
     starts, ends = time[edges[:, 0]], time[edges[:, 1]]
     if len(edges) > BUCKETS:
         # Gaps that nobody could see are closed, for an indicator that chatters would make a file of megabytes.
@@ -142,11 +145,13 @@ def core_of(panel: Panel, drawn: Sequence[Drawn], window: tuple[float, float]) -
     if panel.core is not None:
         return [np.array([-panel.core, panel.core])]
     own, *others = panel.curves
-    values = [_inside(flight, own, window)[1] for flight in drawn]
     if panel.follows is None:
         # Lost flights set the scale only among themselves, and without what they do near their end.
-        survived = [v for f, v in zip(drawn, values, strict=True) if not f.fate]
-        return survived or [v[: max(int(NEAR_END * len(v)), 1)] for v in values]
+        meant = [curve for curve in panel.curves if curve is own or not curve.shared]
+        survived = [_inside(f, curve, window)[1] for f in drawn if not f.fate for curve in meant]
+        lost = (_inside(f, curve, window)[1] for f in drawn for curve in meant)
+        return survived or [v[: max(int(NEAR_END * len(v)), 1)] for v in lost]
+    values = [_inside(flight, own, window)[1] for flight in drawn]
     core = [_inside(flight, curve, window)[1] for flight in drawn for curve in others] + [v[:1] for v in values]
     low, high = span(core) or (0.0, 0.0)
     spare = max(panel.follows - (high - low), 0.0) / 2.0
@@ -172,10 +177,17 @@ def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float) -> N
         axes.set_ylim(-1.0, 1.0)
         axes.text(0.5, 0.5, "no finite values", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
-    middle = middle or everything
+    if middle is None or middle[0] == middle[1]:  # a curve that is constant but for its end has no scale of its own
+        middle = everything
     allowed = reach * max(middle[1] - middle[0], 1e-3 * max(map(abs, middle)), 1e-9)
     low, high = max(everything[0], middle[0] - allowed), min(everything[1], middle[1] + allowed)
     axes.set_ylim(*padded(low, high))
+    note_cut(axes, everything)
+
+
+def note_cut(axes: Axes, everything: tuple[float, float]) -> None:
+    """Say how far curves go on beyond a panel."""
+    low, high = axes.get_ylim()
     note: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "fontsize": 6.5, "color": "0.25", "zorder": 5}
     back = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
     if everything[1] > high:
@@ -210,7 +222,7 @@ def grid(figure: Figure, columns: Sequence[Column], drawn: Sequence[Drawn]) -> l
     for k, column in enumerate(columns):
         below: list[Axes] = []
         for i, panel in enumerate(row[k] for row in rows):
-            if panel is None or not _fill([panel], drawn):
+            if panel is None or not _fill([panel], drawn, column.window):
                 continue
             axes = figure.add_subplot(places[i, k], sharex=below[0] if below else None)
             _draw(axes, panel, column, drawn)
@@ -225,14 +237,21 @@ def grid(figure: Figure, columns: Sequence[Column], drawn: Sequence[Drawn]) -> l
     return made
 
 
-def _fill(row: Iterable[Panel | Strip | None], drawn: Sequence[Drawn]) -> bool:
-    """Whether a flight has anything to show in a row."""
+def _fill(
+    row: Iterable[Panel | Strip | None], drawn: Sequence[Drawn], window: tuple[float, float] | None = None
+) -> bool:
+    """Whether a flight has anything to show in a row, in a window or at all."""
     for panel in row:
+        if panel is None:
+            continue
         if isinstance(panel, Panel):
-            if any(flight.shows(curve.signal, curve.column) for flight in drawn for curve in panel.curves):
+            curves, zero_too = panel.curves, panel.zero_too
+        else:
+            curves, zero_too = tuple(solid(signal, column) for _, signal, column in panel.rows), False
+        for flight, curve in product(drawn, curves):
+            values = _inside(flight, curve, window or whole(drawn))[1]
+            if (np.isfinite(values) & (zero_too | (values != 0.0))).any():
                 return True
-        elif panel is not None and any(flight.moves(signal) for flight in drawn for _, signal, _ in panel.rows):
-            return True
     return False
 
 

@@ -102,5 +102,5 @@ def _wind(drawn: Sequence[Drawn]) -> tuple[list[Panel], list[Any]]:
             strips.append(Panel("wind", curves, np.inf, height=0.75))
             handles = [sample(f"wind on {name}", **style) for name, style in zip("xyz", WIND, strict=True)]
         else:
-            strips.append(Panel(f"size of {signal}", (solid(f"size_of_{signal}"),), np.inf, height=0.75))
+            strips.append(Panel("|wind|", (solid(f"size_of_{signal}"),), np.inf, height=0.75))
     return strips, handles

@@ -21,6 +21,7 @@ BEFORE, AFTER = 0.1, 0.5  # s around the fault onsets that the detail shows
 POSSIBLE: dict[str, Any] = {"linestyle": (0, (1.0, 1.0)), "linewidth": 1.8, "zorder": 2.1}
 FLAG: dict[str, Any] = {"linestyle": "", "marker": "v", "markersize": 5.5, "markeredgecolor": BLACK, "zorder": 6}
 LIGHT_GREY = "0.62"
+APART = 0.11  # of the height of a panel: between the marks of several flights
 HEIGHT = 2.6  # cm per rotor
 MARGIN = 0.07  # of the range of thrust, beyond its limits
 
@@ -87,7 +88,7 @@ def _draw_limits(axes: Axes, limits: Sequence[float]) -> None:
 def _mark_flags(axes: Axes, drawn: Sequence[Drawn], rotor: int) -> None:
     """A triangle at the top wherever the flag of a rotor rises."""
     first, last = axes.get_xlim()
-    for flight in drawn:
+    for k, flight in enumerate(drawn):
         flag = np.nan_to_num(flight.values("fault_flag", rotor)) > 0.5
         times = flight.time[flag & ~np.append(False, flag[:-1])]
         times = times[(times >= first) & (times <= last)]
@@ -95,7 +96,7 @@ def _mark_flags(axes: Axes, drawn: Sequence[Drawn], rotor: int) -> None:
             continue
         axes.plot(
             times,
-            np.full(len(times), 0.97),
+            np.full(len(times), 0.97 - APART * k),
             **FLAG,
             markerfacecolor=flight.colour,
             transform=axes.get_xaxis_transform(),

@@ -20,7 +20,7 @@ from rotorfault.report.style import ORANGE, new_figure
 DEMAND: dict[str, Any] = {"linestyle": "-", "linewidth": 1.8, "zorder": 1.8}
 ALLOCATED: dict[str, Any] = {"color": ORANGE, "linestyle": "-", "linewidth": 0.9, "zorder": 1.9}
 LIGHT_GREY = "0.62"
-HEIGHT = 2.5  # cm per row
+HEIGHT = 2.4  # cm per row
 ROUNDING = 1e-6  # of the largest demand
 GIVEN_UP = Strip("given up", (("tilt", "given_up", 0), ("thrust", "given_up", 1), ("yaw", "given_up", 2)))
 
@@ -38,8 +38,8 @@ def wrench_figure(drawn: Sequence[Drawn]) -> Figure:
     left: list[Panel | Strip] = []
     for name, kind, k in (("thrust", "thrust", None), *((angle, "torque", k) for k, angle in enumerate(ANGLES))):
         curves = [solid(f"{kind}_given", k), Curve(f"{kind}_demand", k, demanded)]
-        if any(_short(flight, kind, k) for flight in drawn):
-            left.append(Panel(f"unallocated\n{name}", (solid(f"{kind}_unallocated", k),)))
+        if any((np.nan_to_num(flight.values(f"{kind}_unallocated", k)) != 0.0).any() for flight in drawn):
+            left.append(Panel(f"unallocated\n{name}", (solid(f"{kind}_unallocated", k),), height=0.8, zero_too=False))
             curves += [Curve(f"{kind}_allocated", k, ALLOCATED)] if alone else []
         given.append(Panel(name, tuple(curves)))
     rows = [*given, *left]
@@ -53,16 +53,13 @@ def wrench_figure(drawn: Sequence[Drawn]) -> Figure:
     return figure
 
 
-def _short(flight: Drawn, kind: str, column: int | None) -> bool:
-    """Whether more than rounding was left of a demand."""
-    left, demand = (flight.values(f"{kind}_{part}", column) for part in ("unallocated", "demand"))
-    return bool(np.isfinite(left).any() and np.nanmax(np.abs(left)) > ROUNDING * np.nanmax(np.abs(demand)))
-
-
 def _with_given(flight: Drawn) -> Drawn:
     """With the allocated wrench, and with the one that true thrusts give; without a vehicle, it is that."""
     for name in ("thrust", "torque"):
-        allocated = flight.values(f"{name}_demand") - flight.values(f"{name}_unallocated")
+        demand, left = flight.values(f"{name}_demand"), flight.values(f"{name}_unallocated")
+        left = np.where(np.abs(left) <= ROUNDING * np.nanmax(np.abs(demand), axis=0, initial=0.0), 0.0, left)
+        flight = flight.adding({f"{name}_unallocated": left}, f"{name}_demand")
+        allocated = demand - left
         flight = flight.adding({f"{name}_allocated": allocated, f"{name}_given": allocated}, f"{name}_demand")
     if (vehicle := flight.vehicle) is None:
         return flight
