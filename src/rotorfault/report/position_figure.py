@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from rotorfault.loop.scores import SETTLED, bands
-from rotorfault.report.drawn import Drawn, whole
+from rotorfault.report.drawn import Drawn, detail, whole
 from rotorfault.report.marks import REFERENCE, legend, sample
 from rotorfault.report.panels import BAND, NEAR_END, Column, Curve, Panel, agree, dashed, grid, solid
 from rotorfault.report.style import ORANGE, SKY, new_figure
@@ -28,6 +28,8 @@ ERROR_REACH = 1.5  # heights of what an error's panel must show, by which it gro
 def position_figure(drawn: Sequence[Drawn]) -> Figure:
     """Position and reference on the left, on the right the error, on a scale that shows what a fault does to it.
 
+    Of a flight to a set point the left shows the first seconds and the faults, where that is a small part of it.
+
     The error on the way to a set point may leave its panel, which says how far; the error after the first fault, or
     of the second half of a flight without one, does not.
     """
@@ -44,8 +46,16 @@ def position_figure(drawn: Sequence[Drawn]) -> Figure:
         for k, (name, band) in enumerate(zip("xyz", width, strict=True))
     ]
     figure = new_figure(10.0 + 2.0 * len(wind))
-    window = whole(drawn)
-    columns = [Column([*positions, *wind], window, "position"), Column([*errors, *wind], window, "error of position")]
+    # To a set point, the whole flight would show the position twice: the error is what is left of it.
+    still = all(not np.ptp(flight.values("position_reference"), axis=0).any() for flight in drawn)
+    close = detail(drawn) if still else None
+    titles = ("position", "error of position")
+    if close is not None:
+        titles = (f"position, {close[0]:g} s to {close[1]:g} s", "error of position, whole flight")
+    columns = [
+        Column([*positions, *wind], close or whole(drawn), titles[0]),
+        Column([*errors, *wind], whole(drawn), titles[1]),
+    ]
     grid(figure, columns, drawn)
     settling = [Patch(**BAND, label=f"settled ({100.0 * SETTLED:g} %)")] if width[0] is not None else []
     legend(figure, drawn, [sample("reference", **REFERENCE), *settling, *handles])
