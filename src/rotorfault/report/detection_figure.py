@@ -48,8 +48,8 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure | None:
         curves = (solid("loss_estimated", k), dashed("loss_true", k), limit)
         loss_panels.append(Panel(f"rotor {rotor}", curves, reach=np.inf))
         limits = [Curve(IN_FORCE, k, threshold), Curve("threshold_below", k, threshold)]
-        curves = (solid("thrust_missing", k), *limits[: 1 + too_much])
-        missing_panels.append(Panel(f"rotor {rotor}", curves, reach=np.inf))
+        missing = (solid("thrust_missing", k), *limits[: 1 + too_much])
+        missing_panels.append(Panel(f"rotor {rotor}", missing, reach=np.inf))
     columns: list[Column] = []
     if losses:
         columns.append(Column(loss_panels, whole(drawn), "loss"))

@@ -177,8 +177,7 @@ def _limit(axes: Axes, parts: list[Array], core: list[Array], reach: float) -> N
         axes.set_ylim(-1.0, 1.0)
         axes.text(0.5, 0.5, "no finite values", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
-    if middle is None or middle[0] == middle[1]:  # a curve that is constant but for its end has no scale of its own
-        middle = everything
+    middle = middle or everything
     allowed = reach * max(middle[1] - middle[0], 1e-3 * max(map(abs, middle)), 1e-9)
     low, high = max(everything[0], middle[0] - allowed), min(everything[1], middle[1] + allowed)
     axes.set_ylim(*padded(low, high))

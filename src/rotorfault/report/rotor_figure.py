@@ -43,7 +43,7 @@ def rotor_figure(drawn: Sequence[Drawn]) -> Figure:
     for k, rotor in enumerate(rotors):
         curves = [solid("thrust", k), Curve("thrust_command", k, command)]
         curves += [Curve("thrust_possible", k, look)] if believing else []
-        panels.append(Panel(f"rotor {rotor}", tuple(curves), np.inf, onset_of=rotor))
+        panels.append(Panel(f"rotor {rotor}", tuple(curves), 1.0, onset_of=rotor))
     figure = new_figure(1.5 + HEIGHT * len(rotors))
     made = grid(figure, whole_and_detail(panels, drawn, around_onsets(drawn, BEFORE, AFTER)), drawn)
     one_scale(axes for column in made for axes in column)

@@ -36,7 +36,7 @@ def sliding_figure(drawn: Sequence[Drawn], window: tuple[float, float] | None = 
         return None
     # Flights of laws without them would stand in the legend and nowhere else.
     drawn = [flight for flight in drawn if flight.has(V) or any(flight.has(signal) for signal, _ in groups)]
-    figure = new_figure(1.5 + 3.2 * rows)
+    figure = new_figure(2.2 + 3.1 * rows)
     places = figure.add_gridspec(rows, 3)
     window = window or whole(drawn)
     made: list[Axes] = []
@@ -57,9 +57,9 @@ def sliding_figure(drawn: Sequence[Drawn], window: tuple[float, float] | None = 
     last = rows - 1
     for axes in made:
         place = axes.get_subplotspec()
-        if place is not None and place.rowspan.start == last:
+        if place is not None and (place.rowspan.start == last or len(place.colspan) > 1):
             axes.set_xlabel("time (s)")
-        elif place is not None and len(place.colspan) == 1:
+        else:
             axes.tick_params(labelbottom=False)
     figure.align_ylabels()
     legend(figure, drawn, [])

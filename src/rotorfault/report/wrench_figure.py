@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from rotorfault.maths.arrays import ANGLES
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.vehicle import wrench_of
-from rotorfault.report.drawn import Drawn
+from rotorfault.report.drawn import Drawn, whole
 from rotorfault.report.marks import legend, sample
-from rotorfault.report.panels import Curve, Panel, Strip, solid, timeline
-from rotorfault.report.style import ORANGE, new_figure
+from rotorfault.report.panels import Curve, Panel, Strip, core_of, solid, timeline
+from rotorfault.report.style import ORANGE, new_figure, span
 
 # Demands are as noisy as what they are made of, so they lie below, and dashes would not be seen.
 DEMAND: dict[str, Any] = {"linestyle": "-", "linewidth": 1.8, "zorder": 1.8}
@@ -38,8 +38,12 @@ def wrench_figure(drawn: Sequence[Drawn]) -> Figure:
     left: list[Panel | Strip] = []
     for name, kind, k in (("thrust", "thrust", None), *((angle, "torque", k) for k, angle in enumerate(ANGLES))):
         curves = [solid(f"{kind}_given", k), Curve(f"{kind}_demand", k, demanded)]
+        asked = core_of(Panel(name, (solid(f"{kind}_demand", k),)), drawn, whole(drawn))
         if any((np.nan_to_num(flight.values(f"{kind}_unallocated", k)) != 0.0).any() for flight in drawn):
-            left.append(Panel(f"unallocated\n{name}", (solid(f"{kind}_unallocated", k),), height=0.8, zero_too=False))
+            # What is left out may be nothing until the end, and then has no scale of its own.
+            size = max(map(abs, span(asked) or (0.0, 0.0)))
+            curve = solid(f"{kind}_unallocated", k)
+            left.append(Panel(f"unallocated\n{name}", (curve,), 0.5, size or None, height=0.8, zero_too=False))
             curves += [Curve(f"{kind}_allocated", k, ALLOCATED)] if alone else []
         given.append(Panel(name, tuple(curves)))
     rows = [*given, *left]

@@ -32,8 +32,8 @@ CAPTIONS = {
     "body axes (z towards the reader); the discs are not to scale.",
     "fig02": f"Case 1, fault detection: true and estimated loss of each rotor with the time over which {FAULTS} are "
     "declared, and the thrust that is missing, with the threshold in force.",
-    "fig03": f"Case 1, set point: position under SMC and ROISMC in a steady wind of 3.6 m/s, with {FAULTS} marked, and "
-    "beside it the error with the band of 2 % in which it counts as settled.",
+    "fig03": f"Case 1, set point: position under SMC and ROISMC in a steady wind of 3.6 m/s, with {FAULTS} marked, "
+    "and beside it the error with the band of 2 % in which it counts as settled.",
     "fig04": "Case 1, set point: roll, pitch and yaw from 45° each, with the command of each position loop dashed.",
     "fig05": "Case 1, set point: rotor speeds; rotors 1 and 3 turn faster once they have lost thrust.",
     "fig06": "Case 1, set point: path in space with its shadow on the floor, and where the faults strike.",
@@ -43,10 +43,10 @@ CAPTIONS = {
     "fig10": "Case 2, sinusoid: control inputs, that is the demanded thrust and torques.",
     "fig11": "Case 2, sinusoid: mean square errors of position and attitude at T_s = 1 and 10 ms.",
     "fig12": "Case 2, sinusoid: path in space; as printed, x and y of the reference lie in one plane.",
-    "fig13": "Case 3, square waves: position and reference, beside them the error, below both the time-varying wind (45).",
+    "fig13": "Case 3, square waves: position and reference, beside them the error, below both the wind of (45).",
     "fig14": "Case 3, square waves: roll, pitch and yaw, with the command of each controller dashed.",
-    "fig15": "Case 3, square waves: actuator outputs, that is the thrust that each rotor delivers, what it was commanded and "
-    "is believed to give at most, between the limits of a sound rotor.",
+    "fig15": "Case 3, square waves: actuator outputs, that is the thrust that each rotor delivers, what it was "
+    "commanded and is believed to give at most, between the limits of a sound rotor.",
     "fig16": "Case 3, square waves: mean square errors of position and attitude at T_s = 1, 10 and 100 ms; a flight "
     "that was lost is hatched and counts until its end.",
 }
