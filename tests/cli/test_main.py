@@ -92,7 +92,7 @@ def test_figures_are_written(tmp_path: Path) -> None:
     done = run("fly", "paper-set-point", "--set", "duration=0.3", "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     names = {path.name for path in tmp_path.iterdir()}
-    expected = {"position.png", "attitude.png", "rotor_speeds.png", "path.png", "fault_detection.png"}
+    expected = {"position.png", "attitude.png", "rotors.png", "wrench.png", "path.png", "sliding.png"}
     assert expected | {"flight.nc", "summary.json"} <= names
 
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 import json
 import re
 import warnings
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from made_up_records import LAYOUT, dataset, rows_of
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
+from rotorfault.report.drawn import flights
+from rotorfault.report.figures import FIGURES
+from rotorfault.report.style import STYLE
 from rotorfault.results.whole import COUNTED, NUMBERS, TEXTS
+from rotorfault.scenario.library import load_scenario
 
-ONSET, THRESHOLD = 1.8, 0.12
+ONSET, THRESHOLD, THRUST_MAX = 1.8, 0.12, 8.68
+CONFIGURATION = json.dumps(load_scenario("paper-set-point").as_tables())
 UNIT = re.compile(r"\(.+\)$")
 
 
@@ -40,8 +47,19 @@ def made_up(
         put(f"loss_estimated.r{rotor}", loss * (1.0 - np.exp(-np.maximum(time - onset, 0.0) / 0.02)))
         put(f"fault_flag.r{rotor}", (loss > 0.0) * (time >= onset + 0.03))
         put(f"rotor_speed.r{rotor}", 1200.0 + 100.0 * np.sin(time + rotor))
+        put(f"loss_believed.r{rotor}", 0.9 * loss * (time >= onset + 0.03))
+        put(f"thrust_command.r{rotor}", 4.0 + np.sin(time + rotor))
+        put(f"thrust.r{rotor}", (1.0 - loss * (time >= onset)) * (4.0 + np.sin(time + rotor)))
+        put(f"expected_thrust.r{rotor}", 4.0)
+        put(f"diagnosis.threshold.r{rotor}", 4.0 * THRESHOLD * (1.0 + 0.5 * np.exp(-np.abs(time - onset) / 0.05)))
+    # Nothing of this happens unless a test says so.
+    for name in ("wind", "disturbance", "torque_unallocated", "given_up"):
+        for axis in "xyz":
+            put(f"{name}.{axis}", 0.0)
+    put("thrust_unallocated", 0.0)
     put("controller.lyapunov", np.exp(-time) + 1e-6)
     given_too: dict[str, object] = {**dict.fromkeys(TEXTS, "made up"), **dict.fromkeys(NUMBERS, 0.0)}
+    given_too |= {"thrust_min": 0.0, "thrust_max": THRUST_MAX, "configuration": CONFIGURATION}
     given_too |= {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
     begun = onset if onset < duration else None
     counted: dict[str, object] = {"outcome": "settled", "survived": True, **dict.fromkeys(COUNTED)}
@@ -55,9 +73,23 @@ def crashed(at: float = 6.0) -> xr.Dataset:
     time = data["time"].values
     blow = 1e-3 * np.exp(np.minimum(np.maximum(time - at + 0.1, 0.0) * 300.0, 40.0))
     for name in data.data_vars:
-        if name not in ("loss_true", "position_reference"):
+        if name not in ("loss_true", "position_reference", "wind", "disturbance"):
             data[name] = data[name] + xr.DataArray(np.where(time < at, blow, np.nan), dims="time")
     return data
+
+
+def spoilt(**signals: object) -> Any:
+    """A made-up flight with other values of some signals."""
+    data = made_up()
+    for name, values in signals.items():
+        data[name][:] = values
+    return data
+
+
+def only(name: str, data: Any) -> Figure:
+    """One of the figures as `draw` makes it: drawing them all takes a second."""
+    with rc_context(STYLE):
+        return FIGURES[name](flights(data))
 
 
 def texts(figure: Figure) -> list[tuple[str, Bbox]]:
@@ -100,7 +132,9 @@ def check_units(name: str, figure: Figure) -> None:
             continue
         place = axes.get_subplotspec()
         if not isinstance(axes.xaxis.get_major_locator(), FixedLocator):  # names of bars have no unit
-            assert bool(UNIT.search(axes.get_xlabel())) == place.is_last_row(), f"{name}: {axes.get_xlabel()!r}"
+            same = [o for o in figure.axes if o.get_subplotspec().colspan == place.colspan]
+            lowest = max(o.get_subplotspec().rowspan.start for o in same) == place.rowspan.start
+            assert bool(UNIT.search(axes.get_xlabel())) == lowest, f"{name}: {axes.get_xlabel()!r}"
         # A detail stands beside a panel of the same quantity, which has the label.
         beside = [other for other in figure.axes if other.get_subplotspec().rowspan == place.rowspan]
         before = [o.get_ylabel() for o in beside if o.get_subplotspec().colspan.start <= place.colspan.start]

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from figure_checks import (
     ONSET,
-    THRESHOLD,
     check_nothing_covered,
     check_units,
     crashed,
     legend_labels,
     lines_of,
     made_up,
+    only,
+    spoilt,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,15 +25,10 @@ from matplotlib.figure import Figure
 from places import SOURCE
 
 from rotorfault.base.errors import InputError
-from rotorfault.report import figures, panels, style
+from rotorfault.report import drawn as drawing
+from rotorfault.report import figures, style
 
-NAMES = {"position", "attitude", "rotor_speeds", "path", "fault_detection", "control", "control_detail"}
-
-
-def only(name: str, data: Any) -> Figure:
-    """One of the figures as `draw` makes it: drawing them all takes a second."""
-    with mpl.rc_context(style.STYLE):
-        return figures.FIGURES[name](panels.flights(data))
+NAMES = {"position", "attitude", "rotors", "wrench", "path", "fault_detection", "sliding", "sliding_detail"}
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +86,8 @@ def test_drawn_data_are_finite_and_complete(one: dict[str, Figure]) -> None:
             assert all(np.isfinite(points).all() for points in own), name
     x = lines_of(one["position"].axes[0], style.BLUE)[0]
     np.testing.assert_allclose(x[:, 1], np.interp(x[:, 0], made_up()["time"], made_up()["position"][:, 0]))
-    assert x[-1, 0] == pytest.approx(19.99)
+    assert x[-1, 0] == pytest.approx(4.0, abs=0.011)  # of 20 s to a set point, the first seconds and the faults
+    assert lines_of(one["position"].axes[3], style.BLUE)[0][-1, 0] == pytest.approx(19.99)
 
 
 def test_reference_is_black_and_dashed(three: dict[str, Figure]) -> None:
@@ -102,7 +99,7 @@ def test_reference_is_black_and_dashed(three: dict[str, Figure]) -> None:
 
 
 def test_fault_onsets_are_marked_and_named_once(one: dict[str, Figure]) -> None:
-    for name in NAMES - {"path"}:
+    for name in NAMES - {"path", "rotors"}:
         for axes in one[name].axes:
             at = [line.get_xdata()[0] for line in axes.lines if line.get_linestyle() == ":"]
             assert at == [pytest.approx(ONSET)], name
@@ -129,7 +126,7 @@ def test_flights_keep_their_colour_and_label(three: dict[str, Figure]) -> None:
 
 
 def test_many_flights_all_look_different() -> None:
-    flights = panels.flights({f"flight {k}": made_up(k, duration=0.5) for k in range(14)})
+    flights = drawing.flights({f"flight {k}": made_up(k, duration=0.5) for k in range(14)})
     assert len({(flight.colour, flight.line) for flight in flights}) == 14
 
 
@@ -158,6 +155,8 @@ def test_a_crash_ends_the_curve_and_does_not_set_the_scale(lost: dict[str, Figur
 def test_ends_are_marked_inside_their_panels(lost: dict[str, Figure]) -> None:
     for name in set(lost) - {"path"}:
         for axes in lost[name].axes:
+            if axes.yaxis_inverted():  # bars
+                continue
             ends = [line for line in axes.lines if line.get_marker() == "x"]
             low, high = axes.get_ylim()
             assert ends or axes.get_xlim()[1] < 5.9, name
@@ -167,14 +166,14 @@ def test_ends_are_marked_inside_their_panels(lost: dict[str, Figure]) -> None:
 def test_a_flight_lost_beside_others_leaves_their_scale_alone(three: dict[str, Figure]) -> None:
     for axes in three["position"].axes:
         assert axes.get_ylim()[1] < 15.0
-    assert three["position"].axes[0].get_xlim()[1] == pytest.approx(20.0)
+    assert three["position"].axes[3].get_xlim()[1] == pytest.approx(20.0)
 
 
 def test_nan_without_an_outcome_ends_a_flight_too() -> None:
     data = made_up()
     del data.attrs["outcome"], data.attrs["end_time"]
     data["attitude"][700:] = np.nan
-    (flight,) = panels.flights(data)
+    (flight,) = drawing.flights(data)
     assert flight.fate
     assert flight.end == pytest.approx(6.99)
 
@@ -182,26 +181,65 @@ def test_nan_without_an_outcome_ends_a_flight_too() -> None:
 def test_a_spinning_vehicle_leaves_the_panel() -> None:
     data = made_up()
     data["attitude"][:, 2] = 100.0 * data["time"] ** 2
-    axes = only("attitude", data).axes[4]
+    axes = only("attitude", data).axes[2]
     assert axes.get_ylabel() == "yaw (rad)"
     assert axes.get_ylim()[1] < 5.0
     assert [text.get_text() for text in axes.texts] == [r"up to $4.0\times 10^{4}$ ↑"]
 
 
 def test_a_flight_that_drifts_off_is_followed_when_alone() -> None:
-    assert only("position", made_up(drift=0.04)).axes[0].get_ylim()[1] > 17.0
+    assert only("position", made_up(drift=0.04)).axes[3].get_ylim()[1] > 15.9
     assert only("position", {"a": made_up(drift=1.0), "b": made_up()}).axes[0].get_ylim()[1] < 12.0
 
 
 def test_detection_shows_threshold_flags_and_residual(one: dict[str, Figure]) -> None:
-    rows = np.array(one["fault_detection"].axes).reshape(4, 3)
+    rows = np.array(one["fault_detection"].axes).reshape(3, 4).T
+    threshold = made_up()["diagnosis.threshold"].values
+    time = made_up()["time"].values
+    assert np.ptp(threshold[:, 0]) > 0.1  # what is in force changes
     for rotor, faulty in enumerate((True, False, True, False)):
         for axes in rows[rotor, :2]:
-            assert [line.get_ydata()[0] for line in axes.lines if line.get_color() == style.GREY] == [THRESHOLD]
+            (curve,) = lines_of(axes, style.ORANGE)
+            np.testing.assert_allclose(
+                curve[:, 1], np.interp(curve[:, 0], time, threshold[:, rotor] / 4.0), rtol=1e-6
+            )
             spans = [path.get_extents() for flags in axes.collections for path in flags.get_paths()]
-            assert [(span.x0, span.x1) for span in spans] == [pytest.approx((1.83, 19.99))] * faulty
-        np.testing.assert_allclose(rows[rotor, 2].lines[0].get_ydata()[:1], made_up()["thrust_residual"][0, rotor])
+            assert [(span.x0, span.x1) for span in spans] == [pytest.approx((1.83, 20.0))] * faulty
+        (missing,), (limit,) = (lines_of(rows[rotor, 2], colour) for colour in (style.BLUE, style.ORANGE))
+        residual = made_up()["thrust_residual"].values[0]
+        assert missing[0, 1] == pytest.approx(np.sort(residual)[-2] - residual[rotor])
+        np.testing.assert_allclose(limit[:, 1], np.interp(limit[:, 0], time, threshold[:, rotor]), rtol=1e-6)
     assert rows[0, 1].get_xlim() == pytest.approx((1.75, 2.05))
+
+
+def test_nothing_is_drawn_of_what_a_flight_does_not_have() -> None:
+    quiet = spoilt(loss_true=0.0, loss_estimated=0.0, loss_believed=0.0, fault_flag=0.0, thrust_residual=0.0)
+    bare = quiet.drop_vars([str(name) for name in quiet.data_vars if str(name).startswith(("controller.", "diag"))])
+    drawn = figures.draw(bare.assign_attrs(scores="{}"))
+    assert set(drawn) == {"position", "attitude", "rotors", "wrench", "path"}
+    said = {label for figure in drawn.values() for label in legend_labels(figure)}
+    assert not said & {"command", "fault declared", "possible, as believed", "threshold in force"}
+    for name, figure in drawn.items():
+        check_nothing_covered(name, figure)
+    # A diagnosis that found nothing still shows how far it was from finding something.
+    watching = spoilt(loss_true=0.0, loss_estimated=0.0, fault_flag=0.0).assign_attrs(scores="{}")
+    figure = only("fault_detection", watching)
+    assert [axes.get_title() for axes in figure.axes] == ["missing thrust", "", "", ""]
+
+
+@pytest.mark.parametrize("size", [1e-4, 1.0, 4.0, 300.0])
+def test_nothing_of_a_path_is_cut_without_a_word(size: float) -> None:
+    time = made_up()["time"].values
+    path = 2.0 + size * np.column_stack([np.sin(time), np.cos(time) - 1.0, 0.01 * time])
+    figure = only("path", {"hover": spoilt(position=2.0), "goes": spoilt(position=path)})
+    check_nothing_covered("path", figure)
+    axes: Any = figure.axes[0]
+    limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    spans = np.ptp(limits, axis=1)
+    np.testing.assert_allclose(spans / spans[0], axes._box_aspect / axes._box_aspect[0])
+    inside = bool(((limits[:, 0] <= path) & (path <= limits[:, 1])).all())
+    said = "cut where it is far off" in legend_labels(figure)
+    assert (inside, said) == ((True, False) if size < 100.0 else (False, True))
 
 
 def test_path_has_equal_scales_and_its_marks(one: dict[str, Figure]) -> None:
@@ -215,20 +253,18 @@ def test_path_has_equal_scales_and_its_marks(one: dict[str, Figure]) -> None:
 
 
 def test_v_is_logarithmic_and_zero_is_said(one: dict[str, Figure]) -> None:
-    assert one["control"].axes[2].get_yscale() == "log"
+    assert one["sliding"].axes[0].get_yscale() == "log"
     data = made_up()
     data["controller.lyapunov"][:] = 0.0
-    axes = only("control", data).axes[2]
+    axes = only("sliding", data).axes[0]
     assert [text.get_text() for text in axes.texts] == ["V = 0"]
 
 
-def test_a_flight_without_records_is_drawn_empty() -> None:
+def test_of_a_flight_without_records_nothing_is_drawn() -> None:
     data = made_up(outcome="diverged", end_time=0.0).isel(time=slice(0))
     drawn = only("position", {"lost at once": data, "other": made_up(duration=1.0)})
     assert "lost at once" in legend_labels(drawn)
-    for figure in figures.draw(data).values():
-        figure.set_layout_engine("none")  # what takes the time, and has nothing to make room for
-        figure.draw_without_rendering()
+    assert figures.draw(data) == {}
 
 
 def test_a_fault_between_the_last_record_and_the_end_is_drawn_where_there_is_a_place() -> None:

@@ -6,7 +6,8 @@ A page is one file that opens offline, so it holds its style itself: a template 
 - ``scroll``: around a table that may be wider than the screen. It alone scrolls; a shadow shows where more is.
 - ``stacked``: a table whose rows become blocks below each other on a telephone. Its head is in a ``<thead>``, each
   cell has its column's title as ``data-label``; a cell of class ``first`` goes to the top of its block.
-- ``confirmed``, ``partly``, ``not``: colours of verdicts. ``n``: a cell of numbers. ``soft``: what is said aside.
+- ``verdict``: a cell whose words are not squeezed; ``confirmed``, ``partly``, ``not``: colours of verdicts.
+- ``n``: a cell of numbers. ``soft``: what is said aside. ``lead``: what a page opens with.
 - ``key``: a row of ``<div>`` with a number (``<b>``) and what it counts, for the top of a page.
 """
 
@@ -47,6 +48,7 @@ nav { display: flex; flex-wrap: wrap; gap: .2rem 1rem; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .88rem; }
 th, td { text-align: left; padding: .3rem .7rem; border-bottom: 1px solid var(--line); vertical-align: top; }
 th { background: var(--tint); }
+td.verdict { min-width: 7.5rem; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .confirmed { color: var(--yes); font-weight: 600; } .partly { color: var(--partly); font-weight: 600; }
 .not { color: var(--no); font-weight: 600; }
@@ -70,6 +72,7 @@ details summary { cursor: pointer; }
     margin: 0 0 .7rem; padding: .4rem .6rem; }
   .stacked td, .stacked td.n { display: block; border: 0; padding: .1rem 0; text-align: left; white-space: normal; }
   .stacked td.first { order: -1; }
+  .stacked td.verdict { min-width: 0; font-size: 1rem; }
   .stacked td[data-label]::before { content: attr(data-label) ": "; color: var(--soft); font-weight: 400; }
 }
 """

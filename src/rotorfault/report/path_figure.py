@@ -12,12 +12,14 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
 from rotorfault.maths.arrays import Array
-from rotorfault.report.panels import END, REFERENCE, Drawn, legend, sample
+from rotorfault.report.drawn import Drawn
+from rotorfault.report.marks import END, REFERENCE, legend, sample
 from rotorfault.report.style import BLACK, GREY, extremes, new_figure, span
 
 START: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.0, "markerfacecolor": "white"}
 FAULT: dict[str, Any] = {"linestyle": "", "marker": "D", "markersize": 4.5, "markeredgecolor": BLACK}
 SAME_PLACE = 0.03  # of the largest side of a reference: points closer than this are one place
+REACH = 10.0  # largest sides of the reference by which a path may leave it before it is cut
 EDGE = 0.96  # share of the figure that the box with its labels takes
 TARGET: dict[str, Any] = {"linestyle": "", "marker": "*", "markersize": 9.0, "color": BLACK}
 
@@ -27,9 +29,11 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
     figure = new_figure(11.5)
     axes: Any = figure.add_subplot(projection="3d")  # Axes3D has no complete type annotations
     low, high = _box(drawn)
+    cut = False
     for flight in drawn:
         path = flight.values("position")
         outside = np.any((path < low) | (path > high), axis=1)
+        cut |= bool(outside.any())
         kept = np.unique(np.concatenate([extremes(path[:, k]) for k in range(3)]))
         visible = np.where(np.asarray(outside)[:, None], np.nan, path)
         axes.plot(*visible[kept].T, color=flight.colour, linestyle=flight.line, linewidth=flight.width, zorder=4)
@@ -55,6 +59,8 @@ def path_figure(drawn: Sequence[Drawn]) -> Figure:
     # Labels stand off in proportion to the sides of the box: in a flat, long one that of z would be far away.
     axes.zaxis.labelpad = 17.5 * float((high - low)[2]) / wide - 13.5
     others.insert(0, sample("start", color=GREY, **START))
+    if cut:
+        others.append(sample("cut where it is far off", linestyle=""))
     top = legend(figure, drawn, others, onset_style=FAULT | {"markerfacecolor": GREY})
     _fill(figure, axes, high - low, top)
     return figure
@@ -90,13 +96,12 @@ def _corners(axes: Any) -> Bbox:
 def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
     """Corners of the drawn space: paths and references, paths that fly far off cut."""
     low, high = np.zeros(3), np.zeros(3)
-    reach = 10.0 if len(drawn) == 1 else 3.0
     targets, starts = [f.values("position_reference") for f in drawn], [f.values("position")[:1] for f in drawn]
     core = np.concatenate(targets + starts)
     size = max(float(np.ptp(core, axis=0).max()), 1.0)
     for k in range(3):
         least, most = span([f.values("position", k) for f in drawn] + [core[:, k]]) or (0.0, 0.0)
-        least, most = max(least, core[:, k].min() - reach * size), min(most, core[:, k].max() + reach * size)
+        least, most = max(least, core[:, k].min() - REACH * size), min(most, core[:, k].max() + REACH * size)
         low[k], high[k] = least, most
     # A path in a plane still gets a box with some depth.
     spare = np.maximum(0.3 * (high - low).max() - (high - low), 0.0) / 2.0 + 0.04 * (high - low).max()

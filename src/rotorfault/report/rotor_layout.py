@@ -11,7 +11,7 @@ from matplotlib.patches import Circle, FancyArrowPatch
 
 from rotorfault.maths.arrays import Array
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.report.panels import sample
+from rotorfault.report.marks import sample
 from rotorfault.report.style import BLACK, BLUE, GREY, VERMILION, new_figure
 
 # By the sign of the yaw torque. Drag turns the body against the rotor, so "+" is a rotor that turns clockwise.

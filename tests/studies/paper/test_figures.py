@@ -144,7 +144,8 @@ def test_error_beside_position_is_their_difference(drawn: dict[str, Figure], res
 
 def test_actuators_are_shown_between_their_limits(drawn: dict[str, Figure]) -> None:
     for axes in drawn["fig15"].axes:
-        assert {line.get_ydata()[0] for line in axes.lines if line.get_color() == style.GREY} == {0.0, 8.68}
+        black = [line for line in axes.lines if line.get_color() == style.BLACK and line.is_dashed()]
+        assert {line.get_ydata()[0] for line in black if line.get_linestyle() != ":"} == {0.0, 8.68}
         assert axes.get_ylim()[0] < 0.0 < 8.68 < axes.get_ylim()[1]
 
 
@@ -235,4 +236,4 @@ def test_a_path_flown_twice_is_dashed_once() -> None:
 def test_files_stay_small(drawn: dict[str, Figure], tmp_path: Path) -> None:
     worst = {key: drawn[key] for key in ("fig05", "fig15")}  # noise in every sample of every panel
     for path in report.save(worst, tmp_path, ("svg",)):
-        assert path.stat().st_size < 300_000, path.name
+        assert path.stat().st_size < 420_000, path.name

@@ -6,24 +6,24 @@ What is drawn in time is flown at 1 ms on the paper's plant; bars of mean square
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from rotorfault.report.bars import Column, error_figure
-from rotorfault.report.figures import FIGURES, position_figure
-from rotorfault.report.panels import Drawn, Panel, flights, legend, sample, solid, timeline
+from rotorfault.report.drawn import Drawn, flights
+from rotorfault.report.figures import FIGURES
+from rotorfault.report.marks import legend
+from rotorfault.report.panels import Panel, solid, timeline
 from rotorfault.report.rotor_layout import layout_figure
-from rotorfault.report.style import BLUE, GREY, STYLE, VERMILION, new_figure
+from rotorfault.report.style import BLUE, STYLE, VERMILION, new_figure
 from rotorfault.scenario.library import load_scenario
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, run_of
 from rotorfault.studies.runs import Result
 
 NAMES = {"smc": "SMC", "roismc": "ROISMC"}
 COLOURS = {"SMC": VERMILION, "ROISMC": BLUE}  # the same in every figure, whichever controllers were flown
-LIMIT: dict[str, Any] = {"color": GREY, "linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.9}
 SHOWN = 0.001  # s: sampling period of the flights that are drawn in time
 
 FAULTS = "the faults (rotor 1 −25 %, rotor 3 −35 % at 1.8 s)"
@@ -31,8 +31,9 @@ CAPTIONS = {
     "fig01": "Rotor layout of the paper's vehicle seen from above: rotor numbers, senses of rotation, arm length and "
     "body axes (z towards the reader); the discs are not to scale.",
     "fig02": f"Case 1, fault detection: true and estimated loss of each rotor with the time over which {FAULTS} are "
-    "declared, and the thrust residual behind the estimate.",
-    "fig03": f"Case 1, set point: position under SMC and ROISMC in a steady wind of 3.6 m/s, with {FAULTS} marked.",
+    "declared, and the thrust that is missing, with the threshold in force.",
+    "fig03": f"Case 1, set point: position under SMC and ROISMC in a steady wind of 3.6 m/s, with {FAULTS} marked, "
+    "and beside it the error with the band of 2 % in which it counts as settled.",
     "fig04": "Case 1, set point: roll, pitch and yaw from 45° each, with the command of each position loop dashed.",
     "fig05": "Case 1, set point: rotor speeds; rotors 1 and 3 turn faster once they have lost thrust.",
     "fig06": "Case 1, set point: path in space with its shadow on the floor, and where the faults strike.",
@@ -42,9 +43,10 @@ CAPTIONS = {
     "fig10": "Case 2, sinusoid: control inputs, that is the demanded thrust and torques.",
     "fig11": "Case 2, sinusoid: mean square errors of position and attitude at T_s = 1 and 10 ms.",
     "fig12": "Case 2, sinusoid: path in space; as printed, x and y of the reference lie in one plane.",
-    "fig13": "Case 3, square waves: position and reference, and below them the time-varying wind (45) on each axis.",
+    "fig13": "Case 3, square waves: position and reference, beside them the error, below both the wind of (45).",
     "fig14": "Case 3, square waves: roll, pitch and yaw, with the command of each controller dashed.",
-    "fig15": "Case 3, square waves: actuator outputs, that is the true thrust of each rotor between its limits.",
+    "fig15": "Case 3, square waves: actuator outputs, that is the thrust that each rotor delivers, what it was "
+    "commanded and is believed to give at most, between the limits of a sound rotor.",
     "fig16": "Case 3, square waves: mean square errors of position and attitude at T_s = 1, 10 and 100 ms; a flight "
     "that was lost is hatched and counts until its end.",
 }
@@ -54,7 +56,7 @@ class _InTime(NamedTuple):
     """A figure of one case's flights at 1 ms."""
 
     case: str
-    make: Callable[[Sequence[Drawn]], Figure]
+    make: Callable[[Sequence[Drawn]], Figure | None]
 
 
 class _Errors(NamedTuple):
@@ -73,37 +75,31 @@ def _control_inputs(drawn: Sequence[Drawn]) -> Figure:
     return figure
 
 
-def _actuator_outputs(drawn: Sequence[Drawn]) -> Figure:
-    """True thrust of each rotor, between the limits of a sound one."""
+def _rotor_speeds(drawn: Sequence[Drawn]) -> Figure:
+    """Rotor speeds, all on one scale."""
     figure = new_figure(11.5)
     rotors = [int(rotor) for rotor in drawn[0].data["rotor"].values]
-    timeline(figure, [Panel(f"rotor {rotor}", (solid("thrust", k),)) for k, rotor in enumerate(rotors)], drawn, True)
-    limits = [float(drawn[0].data.attrs[name]) for name in ("thrust_min", "thrust_max")]
-    spare = 0.05 * (limits[1] - limits[0])
-    for axes in figure.axes:
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(low, limits[0] - spare), max(high, limits[1] + spare))
-        for limit in limits:
-            axes.axhline(limit, zorder=1.6, **LIMIT)
-    legend(figure, drawn, [sample("limit of a sound rotor", **LIMIT)])
+    speeds = [Panel(f"rotor {rotor}", (solid("rotor_speed", k),)) for k, rotor in enumerate(rotors)]
+    timeline(figure, speeds, drawn, common=True)
+    legend(figure, drawn, [])
     return figure
 
 
 _FIGURES: dict[str, _InTime | _Errors] = {
     "fig02": _InTime("set-point", FIGURES["fault_detection"]),
-    "fig03": _InTime("set-point", position_figure),
+    "fig03": _InTime("set-point", FIGURES["position"]),
     "fig04": _InTime("set-point", FIGURES["attitude"]),
-    "fig05": _InTime("set-point", FIGURES["rotor_speeds"]),
+    "fig05": _InTime("set-point", _rotor_speeds),
     "fig06": _InTime("set-point", FIGURES["path"]),
     "fig07": _Errors("set-point"),
-    "fig08": _InTime("sinusoid", partial(position_figure, wind=True, error=True)),
+    "fig08": _InTime("sinusoid", FIGURES["position"]),
     "fig09": _InTime("sinusoid", FIGURES["attitude"]),
     "fig10": _InTime("sinusoid", _control_inputs),
     "fig11": _Errors("sinusoid"),
     "fig12": _InTime("sinusoid", FIGURES["path"]),
-    "fig13": _InTime("square", partial(position_figure, wind=True)),
+    "fig13": _InTime("square", FIGURES["position"]),
     "fig14": _InTime("square", FIGURES["attitude"]),
-    "fig15": _InTime("square", _actuator_outputs),
+    "fig15": _InTime("square", FIGURES["rotors"]),
     "fig16": _Errors("square"),
 }
 
@@ -141,8 +137,9 @@ def draw_all(results: Mapping[str, Result]) -> dict[str, Figure]:
     with rc_context(STYLE):
         figures = {"fig01": layout_figure(load_scenario(CASES["set-point"].scenario).vehicle)}
         for key, figure in _FIGURES.items():
-            if isinstance(figure, _InTime) and drawn[figure.case]:
-                figures[key] = figure.make(drawn[figure.case])
+            if isinstance(figure, _InTime):
+                made = figure.make(drawn[figure.case]) if drawn[figure.case] else None
+                figures |= {} if made is None else {key: made}
             elif isinstance(figure, _Errors) and (columns := _columns(results, figure.case)):
                 figures[key] = error_figure(columns, COLOURS)
     return figures

@@ -9,15 +9,15 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jinja2 import Environment, StrictUndefined
-
 from rotorfault.autopilot.presets import record as record_of
 from rotorfault.base.versions import versions
-from rotorfault.studies.paper import ablation, figures, range_tables, ranges, sensitivity, table1
+from rotorfault.report.page_style import environment
+from rotorfault.studies.paper import ablation, answer, figures, range_tables, ranges, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.paper.verdicts import Claim
 from rotorfault.studies.runs import Result
 
+PICTURE = "fig03"  # opens the page: position and error of case 1 under both laws
 EXTRA_CAPTIONS = {
     "wind": "Claim 5: settling time and oscillation of case 1 against wind speed.",
     "ablation": "What each part of the method is worth, case by case.",
@@ -38,14 +38,19 @@ class Page(NamedTuple):
 def render(page: Page) -> str:
     """The page's HTML."""
     template = (resources.files("rotorfault.studies.paper") / "report.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = _number
-    return environment.from_string(template).render(
-        table=table1.rows(page.results),
+    made = environment()
+    made.filters["number"] = _number
+    table = table1.rows(page.results)
+    drawn = _figures(page, figures.CAPTIONS)
+    return made.from_string(template).render(
+        answer=answer.sentences(page.claims, table, page.results),
+        counts=answer.counts(page.claims),
+        look=answer.look_of,
+        picture=next((figure for figure in drawn if figure["name"] == PICTURE), None),
+        table=table,
         ranges=_ranges(),
         claims=page.claims,
-        counts=_counts(page.claims),
-        figures=_figures(page, figures.CAPTIONS),
+        figures=drawn,
         extras={name: block[0] for name in EXTRA_CAPTIONS if (block := _figures(page, {name: EXTRA_CAPTIONS[name]}))},
         flights=_flights(page.results),
         ablation=[] if page.quick else _rows(page.folder / "ablation.csv"),
@@ -59,14 +64,6 @@ def render(page: Page) -> str:
         flying=sum(result.seconds for result in page.results.values()),
         count=len(page.results),
     )
-
-
-def _counts(claims: list[Claim]) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    for claim in claims:
-        kind = "confirmed under a reading" if claim.verdict.startswith("confirmed under") else claim.verdict
-        counts[kind] = counts.get(kind, 0) + 1
-    return counts
 
 
 def _figures(page: Page, captions: Mapping[str, str]) -> list[dict[str, str]]:
