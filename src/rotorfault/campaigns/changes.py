@@ -97,9 +97,10 @@ def _give_preset(study: Study, tables: dict[str, Any], preset: str) -> None:
         made_for = as_text(record_in_file(preset).get(CONTROLLER.name, ""))
         chosen = [not made_for or name_of(kind) == name_of(made_for) for kind in kinds]
         if not any(chosen):
+            flown = ", ".join(dict.fromkeys(kinds))
             raise InputError(
-                f"preset {preset} is one of controller '{made_for}'; the study flies {', '.join(dict.fromkeys(kinds))}; "
-                "give a preset of one of these, or another --controller"
+                f"preset {preset} is one of controller '{made_for}'; the study flies {flown}; give a preset of one "
+                "of these, or another --controller"
             )
     else:
         chosen = [not is_place(kind) for kind in kinds]

@@ -17,6 +17,7 @@ import numpy as np
 
 from rotorfault.flight.fly import prepare
 from rotorfault.plant import FAULT
+from rotorfault.reference import REFERENCE
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.objectives import onset_of
@@ -102,4 +103,10 @@ def _neighbour(scenario: Scenario, seed: int) -> Scenario:
     early, late = (share * min(times, default=onset_of(scenario)) for share in ONSET)
     late = min(late, LATEST * scenario.duration)
     moved = (min(early, late), late) if math.isfinite(late) and times else (0.0, 0.0)
-    return neighbour(scenario, seed, onset=moved).model_copy(update={"seed": seed})
+    found = neighbour(scenario, seed, onset=moved).model_copy(update={"seed": seed})
+    begin = scenario[REFERENCE].make().table(np.zeros(1)).p_W[0]
+    if np.allclose(scenario.start.position, begin):
+        # It begins where it is to be, and so do its neighbours: else a hover were a search for a small step.
+        start = found.start.model_copy(update={"position": scenario.start.position})
+        found = found.model_copy(update={"start": start})
+    return found
