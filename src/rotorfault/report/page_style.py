@@ -13,8 +13,10 @@ A page is one file that opens offline, so it holds its style itself: a template 
 
 from __future__ import annotations
 
+import re
+
 from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --soft: #57606a; --line: #d0d7de; --paper: #ffffff;
@@ -82,4 +84,16 @@ def environment() -> Environment:
     """The environment of a page's template: it escapes, refuses what is undefined, and knows `STYLE` as ``style``."""
     made = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     made.globals["style"] = Markup(STYLE)
+    made.filters["coded"] = coded
     return made
+
+
+def coded(text: str) -> Markup:
+    """A text as HTML, with what stands between backticks as code.
+
+    Parameters
+    ----------
+    text : str
+        Escaped here.
+    """
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
