@@ -1,4 +1,4 @@
-"""The page of an afternoon's work, command by command, with smaller budgets: all of it runs, and leaves what it says."""
+"""The page of an afternoon's work, command by command, with smaller budgets: all of it runs."""
 
 from __future__ import annotations
 

@@ -51,8 +51,8 @@ EFFORT_WEIGHT = 0.04
 # Of the change of commands in a sampling period, as a share of hover thrust: up to three quarters of what `fly` calls
 # rattling (`rotorfault.loop.scores.RATTLING`) are free, so that a flight noisier than those searched on stays below.
 QUIET_FREE = 0.75 * RATTLING
-QUIET_WEIGHT = 5.0  # s per percent beyond: as much as anything else comes to, so that it is a limit
-LOST_QUIET = 60.0  # s: more than commands that change by 13 %; no flight is worth losing for being quiet
+QUIET_WEIGHT = 10.0  # s per percent beyond: more than anything else comes to, so that it is a limit
+LOST_QUIET = 120.0  # s: more than commands that change by 13 %; no flight is worth losing for being quiet
 # Per span of a reference that moves, where `TRACKING_WEIGHT` has none: a tenth of the span behind it counts as 1 s.
 TRACKING_SHARE = 10.0
 MISSED = 0.05  # loss from which on a rotor that no flag names at the end is missed; the diagnosis finds 0.1
