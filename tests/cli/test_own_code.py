@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 from command_line import assert_refused, run, started
+from places import EXAMPLES
+from typer.testing import CliRunner
 
 import rotorfault as rf
+from rotorfault.cli.main import app
 
 CONTROLLER = """
 from rotorfault import Vec3, Wrench
@@ -128,3 +131,23 @@ def test_check_gives_a_part_the_settings_that_it_needs(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (tmp_path / "mine.toml").write_text("")
     assert_refused(run("check", "mine.toml", "--set", "speed=2.0", cwd=tmp_path), "--set")
+
+
+def test_a_controller_of_ones_own_obeys_settings_and_presets_or_refuses_them(tmp_path: Path) -> None:
+    """They were ignored once."""
+    own = ["fly", "hover-fault", "--controller", f"{EXAMPLES / 'controller.py'}:PdController", "--no-figures"]
+    own += ["--set", "duration=0.3", "--set", "start.position=[0.1,0,5]"]
+    preset = tmp_path / "stiff.toml"
+    preset.write_text("[stiff]\nstiffness = 9.0\n")
+    ends = []
+    for number, more in enumerate(
+        (["--set", "controller.stiffness=3"], ["--set", "controller.stiffness=9"], ["--preset", str(preset)])
+    ):
+        result = CliRunner().invoke(app, [*own, *more, "--out", str(tmp_path / str(number))], catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+        ends.append(rf.load(tmp_path / str(number) / "flight.nc").scores["position_error_end.x"])
+    assert ends[0] != ends[1]
+    assert ends[1] == ends[2]
+    for wrong in (["--preset", "tuned"], ["--set", "controller.cascade.tilt_max=0.5"]):
+        with pytest.raises(rf.InputError, match=r"allowed: (FILE\.toml|stiffness, damping)"):
+            CliRunner().invoke(app, [*own, *wrong], catch_exceptions=False)
