@@ -116,14 +116,14 @@ def test_a_search_that_is_interrupted_gives_the_best_and_ends_with_130(
 ) -> None:
     pytest.importorskip("cma")
 
-    def tune(*_: object) -> search.Tuned:
+    def tune(*_: object, **__: object) -> search.Tuned:
         return search.Tuned("smc", {"gain": 2.0}, {"generations": 3, "objective": 1.5})
 
     monkeypatch.setattr(search, "tune", tune)
     done = run("tune", "smc", "--generations", "10", "--out", f"{tmp_path}/smc.toml")
     assert done.returncode == 130
     assert f"wrote {tmp_path}/smc.toml" in done.stdout
-    assert done.stderr == (f"interrupted after 3 of 10 generations; the best until then is in {tmp_path}/smc.toml\n")
+    assert done.stderr == f"interrupted after 3 of 10 generations; the best until then is in {tmp_path}/smc.toml\n"
     assert run("tune", "smc", "--generations", "3", "--out", f"{tmp_path}/smc.toml").returncode == 0
 
 

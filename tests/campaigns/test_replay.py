@@ -98,8 +98,9 @@ def test_a_replay_warns_where_it_is_not_the_flight_of_the_table(changed: tuple[P
         campaign.replay(never_flown)  # nothing to compare with
     with pytest.warns(ReplayWarning, match=r"^cost is \S+ here and \S+ in the table$") as told:
         flight = campaign.replay(other)
-    assert len(told) == 1
-    assert campaign.differences(other, flight) == [str(told[0].message)]
+    said = [str(one.message) for one in told if one.category is ReplayWarning]
+    assert campaign.differences(other, flight) == said
+    assert len(said) == 1
 
 
 @needs_simd

@@ -85,7 +85,7 @@ def test_a_scenario_is_shown_with_what_it_sets() -> None:
     shown = rows(listed("hover-fault"))
     scenario = load_scenario("hover-fault")
     assert shown["duration"].split()[1:3] == [str(scenario.duration), "s"]
-    assert shown["fault.0.loss"].split()[1] == "0.5"
+    assert shown["fault.0.loss"].split()[1] == "0.4"
     controller = next(part for slot, part in scenario.parts() if slot.name == "controller")
     assert isinstance(controller, Part)
     assert str(controller.settings.cascade.tilt_max) in shown["controller.cascade.tilt_max"]

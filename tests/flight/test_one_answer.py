@@ -177,7 +177,7 @@ def test_the_summary_of_a_lost_flight_says_so(flown: dict[str, rf.Flight]) -> No
     lost, sound = flown["lost"].summary(), flown["faulty"].summary()
     end = f"{lost['end_time']:.4g} s"
     assert f"\n  lost: the numbers are those of the {end} before it tumbled\n" in str(lost)
-    assert "lost" not in str(sound)
+    assert "lost: " not in str(sound)
     assert lost["survived"] is False
     assert lost["settle_time"] == dict.fromkeys(("x", "y", "z", "overall"))
     assert lost["late_position_rms"] is None

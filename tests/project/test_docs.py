@@ -30,6 +30,7 @@ from rotorfault.loop.scores import ENDS, SURVIVED
 from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import LANDING
 from rotorfault.scenario.overrides import parse_overrides
+from rotorfault.scenario.preset_file import is_preset_file
 from rotorfault.scenario.scenario import scenario_from
 from rotorfault.scenario.slots import SLOTS
 
@@ -282,7 +283,7 @@ def test_commands_are_understood(page: str, line: str, monkeypatch: pytest.Monke
         assert f"class {inner}" in (ROOT / file).read_text(encoding="utf-8")
         controller = None
     pairs = parse_overrides([p for p in given["assignments"] or [] if "mine.toml" not in p])
-    if given.get("preset"):
+    if given.get("preset") and not is_preset_file(given["preset"]):
         pairs = {"controller.preset": given["preset"], **pairs}
     prepare(scenario, controller, pairs)
 

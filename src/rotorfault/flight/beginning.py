@@ -49,10 +49,11 @@ def initial_state(
     wanted, own = unflatten((drive.reference, drive.own), reference[0].tolist())
     at_start, first_step = first_normals(loop, seeds)
     drive = drive._replace(reference=wanted, own=own, normals=first_step)
-    # On arrays for a single flight too: NumPy's sine may differ from that of floats in the last bit, and a flight
-    # must begin the same alone and in any batch.
+    # On arrays for a single flight too, and for numbers that all flights share: NumPy's sine and exponential may
+    # differ from those of floats in the last bit, and a flight must begin the same alone and in any batch.
     many = unflatten(start, list(columns(start, len(seeds))))._replace(normals=at_start)
-    state = loop.initial(many, drive, parameters)
+    numbers = unflatten(parameters, list(columns(parameters, len(seeds))))
+    state = loop.initial(many, drive, numbers)
     return state if len(seeds) > 1 else unflatten(state, columns(state, 1)[:, 0].tolist())
 
 

@@ -16,6 +16,7 @@ from rotorfault.flight.reference_rows import unflown
 from rotorfault.loop.scores import RATTLING
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.block import Context
+from rotorfault.model.vehicle_check import vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.plant import FAULT
 from rotorfault.scenario.part import NO_PRESET, Part
@@ -181,6 +182,8 @@ def _trim_warnings(vehicle: str, part: Part[Any], period: float) -> tuple[str, .
     from rotorfault.analysis.trim import trim_report
 
     try:
-        return trim_report(VehicleFile.model_validate_json(vehicle), part.make(), period=period).warnings
+        file = VehicleFile.model_validate_json(vehicle)
+        said = vehicle_warnings(file.vehicle)  # which are told apart
+        return tuple(line for line in trim_report(file, part.make(), period=period).warnings if line not in said)
     except InputError:
         return ()  # outside of what trim looks at

@@ -6,7 +6,6 @@ Source: N. Hansen, "The CMA Evolution Strategy: A Tutorial", arXiv 1604.00772; t
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError, missing_extra, short
 from rotorfault.base.files import output_folder, write_atomically
+from rotorfault.base.one_line import LONGEST, brief, cut
 from rotorfault.base.progress import Bar
 from rotorfault.engine import default_engine, load_engine
 from rotorfault.engine.batch import Batch, no_watch
@@ -52,7 +52,7 @@ class Tuned(NamedTuple):
     record: dict[str, Any]  # what it is for; optimiser, budget, seed, objective
 
     def __repr__(self) -> str:
-        return f"<gains of {self.controller}: objective {self.record.get('objective', math.nan):g}>"
+        return cut(f"<gains of {brief(self.controller)}, {brief(self.record)}>", LONGEST)
 
     def as_toml(self, name: str = "tuned") -> str:
         """The gains as a file of presets, with the record of how they were found.
