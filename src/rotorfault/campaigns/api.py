@@ -252,13 +252,13 @@ def campaign(
     require("" if out is None else out, (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)
     run.check(checked)
-    for scenario in checked.scenarios:
-        doubts.warn(scenario, varied=True)
     executor = executor_of(workers, scheduler)
     complete = not (resume or repair) and run.is_complete(checked, folder)
     with run.open_store(checked, folder, resume or complete, repair) as store:
         for damage in store.repaired:
             say(f"moved aside: {damage.name} ({damage.reason})")
+        for scenario in () if complete else checked.scenarios:
+            doubts.warn(scenario, varied=True)
         progress = run.fly(checked, store, executor, say)
     table = folder / FLIGHTS
     if progress.flights:

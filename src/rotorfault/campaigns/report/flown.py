@@ -14,7 +14,8 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import as_text
 from rotorfault.campaigns.axes import axis
 from rotorfault.campaigns.report.maps import Maps, View
-from rotorfault.campaigns.study import Draw, Study
+from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import Draw
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.scenario.scenario import Mismatch, Scenario
 
