@@ -55,10 +55,15 @@ ranges: .venv/.stamp-develop ## Search gains anew and give the paper's Table 1 a
 	.venv/$(BIN)/rotorfault ranges --out results/ranges
 
 test: .venv/.stamp-develop ## Run the tests
-	.venv/$(BIN)/python -m pytest -n 2
+	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-numpy: .venv-numpy/.stamp ## Run the tests without llvmlite, in .venv-numpy
-	.venv-numpy/$(BIN)/python -m pytest -n 2
+# Where something flies. What reads files, draws, judges or counts is the same with and without a compiler.
+NUMPY_TESTS := tests/analysis tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli \
+  tests/engine tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference \
+  tests/results tests/scenario
+
+test-numpy: .venv-numpy/.stamp ## Run the tests in which something flies without llvmlite, in .venv-numpy
+	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile $(NUMPY_TESTS)
 
 # Both ends of every bound in pyproject.toml: the lowest versions that it allows, and the newest that there are.
 BOUNDS_EXTRAS := flightcode,tune,cluster

@@ -108,7 +108,9 @@ def test_the_recorded_wind_is_the_block_stepped_by_hand() -> None:
     wind, numbers = batch.loop[WIND], batch.parameters.parts.wind
     first = Noise(batch.seeds, FIRST_GUST).draw(1)[0, :, 0].tolist()
     memory = wind.initial(TimeInputs(0.0, tuple(first)), numbers)
-    assert flatten(memory) == flatten(batch.state.truth.wind)
+    # A flight begins on arrays, whose exponential may differ from that of floats in the last bit.
+    assert flatten(memory) == pytest.approx(flatten(batch.state.truth.wind), rel=1e-12)
+    memory = batch.state.truth.wind
     found = run(flown, "python")[:, AIR]
     for k, normals in enumerate(Noise(batch.seeds, GUSTS).draw(20)[:, :, 0].tolist()):
         memory, air, _ = wind.step(memory, TimeInputs(0.005 * k, tuple(normals)), numbers, 0.005)

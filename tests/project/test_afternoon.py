@@ -27,6 +27,8 @@ SMALLER = {
     "tune": ["--generations", "1", "--population", "4", "--neighbours", "1"],
     "campaign": ["--budget", "384"],
     "fly": ["--no-figures"],
+    "compare": ["--no-figures"],
+    "replay": ["--no-figures"],
 }
 
 
