@@ -7,6 +7,7 @@ from gates import needs_simd
 import rotorfault as rf
 from rotorfault.scenario.scenario import Scenario
 
+pytestmark = needs_simd  # 20 s each; that engines agree is tested on shorter flights
 NEIGHBOURS = 100
 SETTLE_LIMIT = 2.5  # s, or 1 s after the fault where that interrupts
 FAULTY = np.array([True, False, True, False])

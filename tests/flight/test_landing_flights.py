@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.engine import have_simd
@@ -13,6 +14,7 @@ from rotorfault.engine.structure import structure
 from rotorfault.flight.assembly import assemble
 from rotorfault.loop.scores import REST
 
+pytestmark = needs_simd  # flights of 10 s; that engines agree on landings is tested in test_one_answer.py
 SCENARIOS = ("land-after-fault", "land-after-fault-hummingbird")
 
 
