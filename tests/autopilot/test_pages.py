@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gates import needs_simd
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from rotorfault.autopilot.allocation.available import thrust_available
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import load_scenario
+
+pytestmark = needs_simd  # long flights; that engines agree is tested elsewhere
 
 Array = NDArray[np.float64]
 T = 0.001

@@ -10,9 +10,12 @@ import numpy as np
 import polars as pl
 import pyarrow as pa
 import pytest
+from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.flight.comparison import Given
+
+pytestmark = needs_simd  # long flights; that engines agree is tested elsewhere
 
 EVIL = "<b>&[red]x[/red]"
 SHORT = {"duration": 0.3}

@@ -6,11 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.base.config import parse_toml
 from rotorfault.engine import have_simd
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE
+
+pytestmark = needs_simd  # long flights; that engines agree is tested elsewhere
 
 FRONT_RIGHT, REAR_LEFT, FRONT_LEFT, REAR_RIGHT = range(4)  # as in the template
 # As flight controllers number an X: Betaflight, PX4 (which the template has), Crazyflie, and one that turns round.

@@ -53,7 +53,8 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         which = np.flatnonzero(flights.variant == variant)
         scenario = study.scenarios[variant]
         varied = {key: column[which] for key, column in settings.items()}
-        parts.append((which, fly_many(scenario, varied, threads=threads).table))
+        # What is hardly meant is said before the first block.
+        parts.append((which, fly_many(scenario, varied, threads=threads, warn=False).table))
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
     grade = grades(table)

@@ -126,6 +126,7 @@ def fly_many(
     engine: str | None = None,
     threads: int | None = None,
     allow_code: bool = False,
+    warn: bool = True,
 ) -> Flights:
     """Fly a scenario many times, with any of its values different in each flight.
 
@@ -150,6 +151,8 @@ def fly_many(
         One per processor if not given. Nothing in the numbers depends on it.
     allow_code : bool
         Whether code that the scenario names may run; code that is named here may.
+    warn : bool
+        Whether to warn of what is hardly meant; see `rotorfault.flight.doubts`.
 
     Returns
     -------
@@ -170,7 +173,7 @@ def fly_many(
     columns = checked_columns(checked, vary)
     count = len(next(iter(columns.values())))
     groups = groups_of(checked, columns)
-    for group in groups:
+    for group in groups if warn else ():
         doubts.warn(group.scenario, varied=True)
     layouts = [build(group.scenario).layout for group in groups] if record else []
     rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)

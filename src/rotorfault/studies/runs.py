@@ -20,7 +20,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.files import read_plain, write_atomically
 from rotorfault.base.versions import source_digest
 from rotorfault.flight.flight import load
-from rotorfault.flight.fly import fly
+from rotorfault.flight.fly import fly_checked
 from rotorfault.results.outcome import finite_or_none
 from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.scenario import Scenario
@@ -114,7 +114,7 @@ class RunStore:
 
     def _fly(self, run: Run, scenario: Scenario) -> Result:
         start = time.perf_counter()
-        flight = fly(scenario)
+        flight = fly_checked(scenario)
         if flight.outcome.kind == "interrupted":
             raise KeyboardInterrupt
         extra = {} if self._measure is None else finite_or_none(self._measure(flight.data))
