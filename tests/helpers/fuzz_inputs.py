@@ -17,6 +17,7 @@ from typing import Any
 
 import h5py
 from fuzz_values import Draw, changed, changed_bytes, edges, hostile, inline, plausible, single, text_of, words
+from hypothesis import reject
 from hypothesis import strategies as st
 
 from rotorfault.campaigns.studies import FOLDER, study_names
@@ -231,7 +232,10 @@ def _edit(draw: Draw, file: Any) -> None:
     name = draw(st.sampled_from(sorted(holder.attrs)))
     old = holder.attrs[name]
     if isinstance(old, str) and old[:1] == "{" and draw(st.integers(0, 3)):
-        new = json.dumps(changed(draw, json.loads(old)), default=str)
+        try:
+            new = json.dumps(changed(draw, json.loads(old)), default=str)
+        except ValueError:
+            reject()  # a number of more digits than Python writes out, so that no file can hold it
         _put(lambda value: holder.attrs.__setitem__(name, value), new)
         return
     del holder.attrs[name]
