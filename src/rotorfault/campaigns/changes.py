@@ -21,7 +21,7 @@ from rotorfault.base.foreign import is_place
 from rotorfault.campaigns.axes import axis, columns
 from rotorfault.campaigns.flight_set import FlightSet, values_of
 from rotorfault.campaigns.studies import LONGEST_NAME
-from rotorfault.campaigns.study import Study, study_from
+from rotorfault.campaigns.study import Study, of_controller, study_from
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import with_whole_paths
 from rotorfault.scenario.preset_file import is_preset_file, name_of, record_in_file
@@ -77,7 +77,7 @@ def changed(
     if named:
         tables["variant"] = _variants(tables, named)
         common = tables["settings"]
-        tables["settings"] = {key: value for key, value in common.items() if not _of_controller(key)}
+        tables["settings"] = {key: value for key, value in common.items() if not of_controller(key)}
         tables["name"] = _shortened("-".join([tables["name"], *(_word(label) for label in _labels(named))]))
     for one in [preset] if isinstance(preset, str) else preset or ():
         _give_preset(study, tables, one)
@@ -177,11 +177,11 @@ def _variants(tables: dict[str, Any], names: list[str]) -> list[dict[str, Any]]:
     merged = [{**tables["settings"], **variant["settings"]} for variant in tables["variant"]]
     shared = [key for key in merged[0] if all(key in one and one[key] == merged[0][key] for one in merged)]
     # Settings of one law are none of another's; a preset for all, or of the cascade, holds for any that has it.
-    common = {key: merged[0][key] for key in shared if _of_controller(key)}
+    common = {key: merged[0][key] for key in shared if of_controller(key)}
     common = {} if {KIND, CONTROLLER.name} & set(common) else common
     rests: list[tuple[str, dict[str, Any]]] = []
     for variant in tables["variant"]:
-        rest = {key: value for key, value in variant["settings"].items() if not _of_controller(key)}
+        rest = {key: value for key, value in variant["settings"].items() if not of_controller(key)}
         if rest not in [known for _, known in rests]:
             rests.append((variant["label"], rest))
     found = []
@@ -191,10 +191,6 @@ def _variants(tables: dict[str, Any], names: list[str]) -> list[dict[str, Any]]:
             title = label if len(rests) == 1 else f"{label}, {which}"
             found.append({"label": title[:LONGEST_LABEL], "settings": {**rest, **own}})
     return found
-
-
-def _of_controller(key: str) -> bool:
-    return key.partition(".")[0] == CONTROLLER.name
 
 
 def _labels(names: Sequence[str]) -> list[str]:

@@ -178,11 +178,11 @@ class Study(Strict):
         for number, variant in enumerate(tables["variant"]):
             if everywhere or _names_preset_file(variant["settings"]):
                 part = self.scenario_of(number)[CONTROLLER]
-                rest = {key: value for key, value in variant["settings"].items() if not _of_controller(key)}
+                rest = {key: value for key, value in variant["settings"].items() if not of_controller(key)}
                 variant["settings"] = {**rest, CONTROLLER.name: part.as_table()}
         if everywhere:
             for settings in common:
-                for key in [key for key in settings if _of_controller(key)]:
+                for key in [key for key in settings if of_controller(key)]:
                     del settings[key]
 
     @property
@@ -290,7 +290,8 @@ class Study(Strict):
         return study_from, (self.as_tables(), self.name, self._allow_code)
 
 
-def _of_controller(key: str) -> bool:
+def of_controller(key: str) -> bool:
+    """Whether a dotted key of a scenario is one of its controller."""
     return key.partition(".")[0] == CONTROLLER.name
 
 

@@ -80,35 +80,42 @@ def fly(
         If anything that was given cannot be used; one line that says how to mend it.
     """
     named = controller if isinstance(controller, str) else None
-    if controller is not None and named is None:
+    own = controller if named is None else None
+    if own is not None:
         _require_no_settings(settings or {})
     checked = prepare(scenario, named, settings, seed, allow_code)
-    doubts.warn(checked, own_controller=not (controller is None or named is not None))
-    own: Own = {} if controller is None or named is not None else {CONTROLLER: as_controller(controller)}
-    batch = assemble(checked, own)
+    doubts.warn(checked, own_controller=own is not None)
+    flight = fly_checked(checked, own, engine)
+    if doubt := doubts.rattling(flight.scores, flight.label):
+        warnings.warn(doubt.says, doubt.kind, stacklevel=2)
+    return flight
+
+
+def fly_checked(scenario: Scenario, controller: Any = None, engine: str | None = None) -> Flight:
+    """Fly a checked scenario without a word about what is hardly meant, for studies of what is odd on purpose.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    controller : object, optional
+        Flies in place of the scenario's; as for `fly`.
+    engine : str, optional
+        As for `fly`.
+
+    Raises
+    ------
+    InputError
+        If the engine cannot run a part.
+    """
+    own: Own = {} if controller is None else {CONTROLLER: as_controller(controller)}
+    batch = assemble(scenario, own)
     python_only = any(part.python_only for _, part in batch.loop.each())
     name = ("python" if python_only else default_engine(1)) if engine is None else engine
     if name != "python" and python_only:
         raise InputError(
             f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
         )
-    flight = _flight(checked, _run(batch, name, checked.period), batch, 0, name, controller if own else None)
-    if doubt := doubts.rattling(flight.scores, flight.label):
-        warnings.warn(doubt.says, doubt.kind, stacklevel=2)
-    return flight
-
-
-def fly_checked(scenario: Scenario) -> Flight:
-    """Fly a checked scenario without a word about what is hardly meant, for studies of what is odd on purpose.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    """
-    batch = assemble(scenario, {})
-    python_only = any(part.python_only for _, part in batch.loop.each())
-    name = "python" if python_only else default_engine(1)
-    return _flight(scenario, _run(batch, name, scenario.period), batch, 0, name, None)
+    return _flight(scenario, _run(batch, name, scenario.period), batch, 0, name, controller)
 
 
 def _require_no_settings(settings: Mapping[str, Any]) -> None:

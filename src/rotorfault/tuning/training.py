@@ -25,7 +25,7 @@ from rotorfault.tuning.space import SPACES
 
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
 RECORD = 0.01  # s between two records: what objectives read changes no faster
-LAG = (0.75, 1.25)  # factors of the rotors' bandwidth: a filter over the commands knows it no better
+LAG = (0.75, 1.25)  # factors of the rotors' bandwidth: gains must not rest on a lag that is known exactly
 NEIGHBOURS = 7  # of a scenario of a user's own
 # Of the time of its first fault: a search must not count on the fault at the one instant.
 ONSET = (0.5, 1.5)
