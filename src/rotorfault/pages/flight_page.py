@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
-from rotorfault.base.plain_text import one_line
+from rotorfault.base.plain_text import argument, one_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.model.vehicle_file import VehicleFile
@@ -92,11 +92,13 @@ def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
     whole = [_complete(flight) for flight in flights]
     values = sum(np.asarray(v.values).size for data, _ in whole for v in data.variables.values())
     every = max(1, int(values * 0.6 / ROOM))  # packed, a value takes half a character or more
+    longest = max(len(data["time"].values) for data, _ in whole)
+    dense = DENSE
     while True:
-        tracks = [_tracks(data, every) for data, _ in whole]
-        if sum(size for _, size in tracks) <= ROOM:
+        tracks = [_tracks(data, every, dense) for data, _ in whole]
+        if sum(size for _, size in tracks) <= ROOM or every >= longest:
             break
-        every *= 2
+        every, dense = 2 * every, 0.5 * dense
     return {
         "flights": [
             {
@@ -105,7 +107,6 @@ def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
                 "events": [event._asdict() for event in events(flight.data)],
                 "panels": [_panel(panel) for panel in panels(data, _limits(data))],
                 "ground": _ground(data),
-                "rows": [list(row) for row in flight.rows],
                 **track,
             }
             for flight, (data, vehicle), (track, _) in zip(flights, whole, tracks, strict=True)
@@ -124,20 +125,21 @@ def _complete(flight: Shown) -> tuple[FlightData, Vehicle | None]:
     return derived(flight.data, vehicle), vehicle
 
 
-def _tracks(data: FlightData, every: int) -> tuple[dict[str, Any], int]:
+def _tracks(data: FlightData, every: int, dense: float) -> tuple[dict[str, Any], int]:
     """The signals of a flight, packed, and how many characters they take."""
     time = np.asarray(data["time"].values, dtype=float)
     moments = [event.time for event in islice(events(data), 60)]
-    keep = thinned(time, every, moments, DENSE)
+    keep = thinned(time, every, moments, dense)
     signals: dict[str, Any] = {}
     size = 0
     for name, variable in data.variables.items():
         if variable.dims[:1] != ("time",) or not np.issubdtype(np.asarray(variable.values).dtype, np.number):
             continue
         values = np.asarray(variable.values, dtype=float)[keep].reshape(len(keep), -1)
+        name = _short(name)
         signals[name] = {
-            "unit": str(variable.attrs.get("units", "1")),
-            "about": str(variable.attrs.get("long_name", "")),
+            "unit": _short(variable.attrs.get("units", "1")),
+            "about": _short(variable.attrs.get("long_name", "")),
             "columns": _columns(data, variable.dims[1:], np.asarray(variable.values).shape[1:]),
             **packed(values),
         }
@@ -147,7 +149,7 @@ def _tracks(data: FlightData, every: int) -> tuple[dict[str, Any], int]:
 
 def _columns(data: FlightData, dims: Sequence[str], shape: Sequence[int]) -> list[str]:
     """Names of a signal's columns, such as ``x`` or ``roll pitch``."""
-    names = [[str(value) for value in data.coordinates[dim].values] for dim in dims]
+    names = [[_short(value) for value in data.coordinates[dim].values] for dim in dims]
     return [" ".join(names[d][i] for d, i in enumerate(at)) for at in np.ndindex(*shape)]
 
 
@@ -217,8 +219,8 @@ def _provenance(flight: Shown) -> dict[str, Any]:
             ("parts", ", ".join(f"{_short(part['slot'])} {_short(part['kind'])}" for part in parts)),
             ("flown with", ", ".join(f"{_short(name)} {_short(value)}" for name, value in versions.items())),
         ],
-        "rows": flight.rows,
-        "command": f"rotorfault fly --repeat {flight.source}" if flight.source else "",
+        "rows": [(_short(label), _short(text)) for label, text in flight.rows],
+        "command": one_line(f"rotorfault fly --repeat {argument(flight.source)}") if flight.source else "",
     }
 
 

@@ -15,9 +15,10 @@ from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.results.events import isolation_time, onsets
+from rotorfault.results.events import faults_of, isolation_time, onsets
 from rotorfault.results.flight_data import FlightData
 
+HOLD_THRUST = ("stuck",)  # faults that are no loss: what a rotor can give does not follow from one
 LOOKS = {"settled": "good", "tracked": "good", "landed": "good", "offset": "fair", "interrupted": "fair"}
 
 
@@ -114,6 +115,8 @@ def _margin(data: FlightData) -> Fact | None:
     vehicle = true_vehicle(data)
     if vehicle is None or "loss_true" not in data or len(data["time"].values) == 0:
         return None
+    if any(fault.get("kind") in HOLD_THRUST for rotor in _rotors(data) for fault in faults_of(data, rotor)):
+        return None
     loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
     if loss.shape[1] != len(PerRotor.__slots__):
         return None
@@ -131,6 +134,10 @@ def _margin(data: FlightData) -> Fact | None:
     if math.isfinite(least_free):
         return Fact(f"{least_free:.2g} m/s²", "least margin, yaw given up", note, "fair")
     return Fact("none", "least margin", "at some time no hover was possible with the true losses", "bad")
+
+
+def _rotors(data: FlightData) -> range:
+    return range(1, data["loss_true"].values.shape[1] + 1)
 
 
 def _milliseconds(seconds: float) -> str:
