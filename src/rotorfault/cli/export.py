@@ -7,27 +7,49 @@ from typing import Annotated
 
 import typer
 
+from rotorfault.base.errors import InputError, choices
 from rotorfault.cli.app import app, say
 
 
 @app.command()
 def export(
     flight: Annotated[Path, typer.Argument(metavar="FLIGHT.nc", help="A flight file that 'rotorfault fly' wrote.")],
-    to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="Format: csv.")],
+    to: Annotated[
+        str | None,
+        typer.Option(
+            "--to",
+            metavar="FORMAT",
+            help="csv, parquet, mat (MATLAB), mcap (Foxglove), rrd (Rerun) or ulog "
+            "(PX4); told by the ending of --out if not given.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write; beside the flight if not given.")
     ] = None,
     every: Annotated[int, typer.Option(metavar="N", help="Write one of N records.")] = 1,
-    units: Annotated[bool, typer.Option("--units/--no-units", help="Units in the names of columns.")] = True,
+    units: Annotated[bool, typer.Option("--units/--no-units", help="Units in names or descriptions.")] = True,
+    layout: Annotated[
+        bool, typer.Option("--layout", help="With mcap: write a layout for Foxglove beside the file.")
+    ] = False,
 ) -> None:
-    """Write a flight for other tools: one table, a row per record and a column per component.
+    """Write a flight for other tools: tables, MATLAB, Foxglove, Rerun, PX4's log.
 
-    Example: rotorfault export results/calm/flight.nc --to csv --every 10
+    Example: rotorfault export results/calm/flight.nc --to mcap --every 10 --layout
     """
+    from rotorfault.base.files import write_atomically
     from rotorfault.flight.flight import load
-    from rotorfault.results import dataset
-    from rotorfault.results.export import target_of, writer
+    from rotorfault.results.export import FORMATS, format_of, foxglove_layout, target_of
+    from rotorfault.results.export import export as write
 
-    write = writer(to)
-    data = dataset.as_flight_data(load(flight).data)
-    say(f"wrote {write(data, target_of(to, flight, out), every, units)}")
+    if to is None and out is None:
+        raise InputError(f"no format was given; give --to ({choices(FORMATS)}), or --out with its ending")
+    form = format_of(out) if to is None and out is not None else to or ""
+    if layout and form != "mcap":
+        raise InputError(f"--layout is for the format mcap; got --to {form}")
+    target = target_of(form, flight, out)
+    records = load(flight).records()
+    say(f"wrote {write(records, target, form, every, units)}")
+    if layout:
+        beside = target.with_suffix(".layout.json")
+        write_atomically(beside, lambda path: path.write_text(foxglove_layout(records), encoding="utf-8"))
+        say(f"wrote {beside}; in Foxglove: Layouts, Import from file")

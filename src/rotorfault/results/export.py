@@ -1,92 +1,107 @@
-"""Flights in files that other tools read."""
+"""Flights in files that other tools read: which formats there are, and what writes each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
-import numpy as np
-
-from rotorfault.base.csv_text import write_columns
-from rotorfault.base.errors import InputError, unknown
-from rotorfault.base.progress import Bar
-from rotorfault.maths.arrays import Array
+from rotorfault.base.errors import InputError, choices, unknown
+from rotorfault.results.exporters.content import Content, content_of
+from rotorfault.results.exporters.csv_file import write_csv
+from rotorfault.results.exporters.mat_file import write_mat
+from rotorfault.results.exporters.mcap_file import layout, write_mcap
+from rotorfault.results.exporters.parquet_file import write_parquet
+from rotorfault.results.exporters.rrd_file import write_rrd
+from rotorfault.results.exporters.ulog_file import write_ulog
 from rotorfault.results.flight_data import FlightData
 
-Writer = Callable[[FlightData, Path, int, bool], Path]
-"""Writes every so many records of a flight to a path, with or without units in the names of its columns."""
+
+class Format(NamedTuple):
+    """A format of files."""
+
+    ending: str  # of its files, without a dot
+    says: str  # one line
+    write: Callable[[Content, Path], None]
 
 
-def columns_of(data: FlightData, every: int = 1, units: bool = True) -> dict[str, Array]:
-    """The records of a flight as named columns, on the same memory.
-
-    Parameters
-    ----------
-    data : FlightData
-    every : int
-        Of so many records one is taken, from the first on.
-    units : bool
-        Whether a name ends in its unit, as in ``velocity_x [m/s]``; pure numbers have ``[1]``.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (records,)
-        ``time``, then each signal; the component of a vector stands behind an underscore, as in ``thrust_1``.
-
-    Raises
-    ------
-    InputError
-        If `every` is no whole number from 1 on, or something in the flight is not over time.
-    """
-    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
-        raise InputError(f"every: got {every!r}; allowed: a whole number of records, 1 or more")
-    columns: dict[str, Array] = {}
-    for name, variable in ({"time": data["time"]} | data.variables).items():
-        if variable.dims[:1] != ("time",):
-            dims = ", ".join(variable.dims) or "no dimension"
-            raise InputError(f"'{name}' has {dims}; allowed in a table: what is over time; drop it from the data")
-        unit = f" [{variable.attrs.get('units', '1')}]" if units else ""
-        for at in np.ndindex(variable.values.shape[1:]):
-            parts = (str(data[dim].values[i]) for dim, i in zip(variable.dims[1:], at, strict=True))
-            columns["_".join((name, *parts)) + unit] = variable.values[(slice(None, None, every), *at)]
-    return columns
+FORMATS: dict[str, Format] = {
+    "csv": Format("csv", "one table of text", write_csv),
+    "parquet": Format("parquet", "one table of Arrow, with units", write_parquet),
+    "mat": Format("mat", "structures of MATLAB", write_mat),
+    "mcap": Format("mcap", "Foxglove and Lichtblick: scene in 3-D, plots", write_mcap),
+    "rrd": Format("rrd", "Rerun: scene in 3-D, plots", write_rrd),
+    "ulog": Format("ulg", "PX4: Flight Review, PlotJuggler", write_ulog),
+}
+"""By the name that ``rotorfault export --to`` takes."""
 
 
-def write_csv(data: FlightData, path: Path, every: int = 1, units: bool = True) -> Path:
-    """Write a flight as one table of text: a row per record, a column per component.
+def export(data: FlightData, path: Path, to: str | None = None, every: int = 1, units: bool = True) -> Path:
+    """Write a flight for another tool, whole or not at all.
 
     Parameters
     ----------
     data : FlightData
     path : Path
-    every, units
-        As for `columns_of`.
+    to : str, optional
+        One of `FORMATS`; told by the ending of the path if not given.
+    every : int
+        Of so many records one is written, from the first on.
+    units : bool
+        Whether names or descriptions of columns have units.
 
     Raises
     ------
     InputError
-        As `columns_of`, or if the folder does not exist.
+        If there is no such format, `every` is no whole number from 1 on, the folder does not exist, or the flight
+        does not fit into the format.
+    MissingExtraError
+        If the format needs a library that is not installed.
     """
-    columns = columns_of(data, every, units)
-    with Bar("writing", len(next(iter(columns.values()))), "records") as bar:
-        return write_columns(path, columns, bar.update)
+    form = named(format_of(path) if to is None else to)
+    if not len(data["time"].values):
+        raise InputError("the flight has no records; there is nothing to export")
+    form.write(content_of(data, every, units), path)
+    return path
 
 
-FORMATS: dict[str, Writer] = {"csv": write_csv}
-"""By the name that ``rotorfault export --to`` takes, which is the ending of the file as well."""
-
-
-def writer(form: str) -> Writer:
-    """What writes a format.
+def named(name: str) -> Format:
+    """A format by its name.
 
     Raises
     ------
     InputError
         If there is no such format.
     """
-    if form not in FORMATS:
-        raise InputError(f"--to: {unknown('format', form, list(FORMATS))}")
-    return FORMATS[form]
+    if not isinstance(name, str) or name not in FORMATS:
+        raise InputError(f"--to: {unknown('format', name, list(FORMATS))}")
+    return FORMATS[name]
+
+
+def format_of(path: Path) -> str:
+    """Name of the format that the ending of a path tells.
+
+    Raises
+    ------
+    InputError
+        If it is the ending of none.
+    """
+    ending = path.suffix.removeprefix(".").lower()
+    for name, form in FORMATS.items():
+        if ending in (form.ending, name):
+            return name
+    endings = choices(f".{form.ending}" for form in FORMATS.values())
+    raise InputError(f"{path}: its ending tells no format ({endings}); give one of these, or the format with --to")
+
+
+def foxglove_layout(data: FlightData) -> str:
+    """A layout of Foxglove's for the MCAP file of a flight, as JSON.
+
+    Parameters
+    ----------
+    data : FlightData
+    """
+    return layout(content_of(data))
 
 
 def target_of(form: str, source: Path, target: Path | None = None) -> Path:
@@ -104,11 +119,12 @@ def target_of(form: str, source: Path, target: Path | None = None) -> Path:
     Raises
     ------
     InputError
-        If that is the source or a folder.
+        If there is no such format, or that is the source or a folder.
     """
-    path = source.with_suffix(f".{form}") if target is None else target
+    ending = named(form).ending
+    path = source.with_suffix(f".{ending}") if target is None else target
     if path.is_dir():
-        raise InputError(f"{path}: is a folder; give a file with --out, such as {path / f'{source.stem}.{form}'}")
+        raise InputError(f"{path}: is a folder; give a file with --out, such as {path / f'{source.stem}.{ending}'}")
     if path.exists() and path.samefile(source):
         raise InputError(f"{path}: is the flight itself; give another file with --out")
     return path

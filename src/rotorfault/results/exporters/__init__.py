@@ -1,0 +1,1 @@
+"""Flights in the formats of other tools, a file for each."""
