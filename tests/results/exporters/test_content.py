@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import string
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +48,8 @@ def test_two_columns_of_one_name_are_both_there() -> None:
     assert np.array_equal(found["position_x [m]"], data["position"].sel(axis="x"))
 
 
-def test_colours_go_from_blue_to_vermilion() -> None:
-    assert colours(np.array([0.0, 0.5, 1.0])).tolist() == [[0, 114, 178], [240, 228, 66], [213, 94, 0]]
+def test_colours_go_from_blue_over_yellow_to_vermilion() -> None:
+    assert colours(np.array([0.0, 0.15, 1.0])).tolist() == [[0, 114, 178], [240, 228, 66], [213, 94, 0]]
 
 
 def test_moments_are_not_more_than_asked_for() -> None:
@@ -121,15 +120,15 @@ def test_a_flight_without_records_is_refused(tmp_path: Path) -> None:
 def test_matlab_refuses_what_it_cannot_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mat_file, "LARGEST", 10_000)
     with pytest.raises(
-        rf.InputError, match="MATLAB file of version 5 holds 2 GiB .* take fewer records with --every"
+        rf.InputError, match=r"MATLAB file of version 5 holds 2 GiB .* take fewer records with --every"
     ):
         flight().export(tmp_path / "a.mat")
     assert not list(tmp_path.iterdir())
 
 
 def test_events_are_of_all_records_however_few_are_written() -> None:
-    few: Callable[[int], list[str]] = lambda every: [
-        event.text for event in content_of(flight().records(), every).events
-    ]
+    def few(every: int) -> list[str]:
+        return [event.text for event in content_of(flight().records(), every).events]
+
     assert few(100) == few(1)
     assert "rotor 2 loses 30 % of its thrust" in few(1)

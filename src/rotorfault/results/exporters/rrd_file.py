@@ -150,7 +150,8 @@ def _plot(stream: rr.RecordingStream, content: Content, column: Column) -> None:
     stream.send_columns(place, _times(content), rr.Scalars.columns(scalars=np.asarray(column.values, dtype=float)))
     stream.log(place, rr.SeriesLines(names=[column.label(content.units)[:LONGEST]]), static=True)
     about = {"meaning": column.meaning, "frame": column.frame} | ({"unit": column.unit} if content.units else {})
-    stream.log(place, rr.AnyValues(**{key: text for key, text in about.items() if text}), static=True)
+    if said := {key: text for key, text in about.items() if text}:
+        stream.log(place, rr.AnyValues(**said), static=True)
 
 
 def _say(stream: rr.RecordingStream, content: Content) -> None:
