@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
     from rotorfault.maths.rotation import Quat
     from rotorfault.model.block import Context, Nothing
+    from rotorfault.model.conventions import convert
     from rotorfault.model.signals import Allocation, Diagnosis, Estimate, Reading, Readings, Reference, State, Wrench
     from rotorfault.model.slot import register
     from rotorfault.model.telemetry import Quantity
@@ -111,6 +112,7 @@ _HOME = {
     "campaign": "campaigns.api",
     "check_block": "flight.check_block",
     "compare": "flight.comparison",
+    "convert": "model.conventions",
     "critical_loss": "analysis.hover",
     "critical_pair": "analysis.hover",
     "fly": "flight.fly",
@@ -189,6 +191,7 @@ __all__ = [
     "campaign",
     "check_block",
     "compare",
+    "convert",
     "critical_loss",
     "critical_pair",
     "fly",

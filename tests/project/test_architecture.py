@@ -15,7 +15,9 @@ FILES = sorted(SOURCE.rglob("*.py"))
 BELIEF = ("autopilot",)
 # Imports that may wait inside a function until they are needed, by module, and why.
 # A command of the command line loads what it runs when it is called, so that `--help` and `list` cost nothing.
-COMMANDS = tuple(f"rotorfault.cli.{name}" for name in ("campaign", "export", "fly", "look", "studies", "tune"))
+COMMANDS = tuple(
+    f"rotorfault.cli.{name}" for name in ("campaign", "convert", "export", "fly", "look", "studies", "tune")
+)
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"
 OPTIONAL = "need not be installed"

@@ -1,0 +1,180 @@
+"""Conventions of others: their axes, their attitude, their numbers of motors.
+
+Here the world has x forward, y left, z up, and so has the body. PX4, ArduPilot and aviation have the world as north,
+east, down (NED) and the body as forward, right, down (FRD). Taking x for north, both pairs of frames differ by half a
+turn about x, whose matrix is D = diag(1, -1, -1) = D^-1. So
+
+    vectors      v' = D v                          y and z change sign
+    attitude     R' = D R D                        q' = (w, x, -y, -z)
+    its angles   R = Rz(yaw) Ry(pitch) Rx(roll)    roll' = roll, pitch' = -pitch, yaw' = -yaw
+
+and the way back is the same. Quaternions are Hamilton's, scalar first, body to world, in all of them.
+
+The motors of an X quadrotor are named by where they are. The orders are those of PX4's generic quad X (airframe
+4001), of ArduPilot's FRAME_CLASS 1 with FRAME_TYPE 1, of Betaflight's quad X with props in, and of the Crazyflie.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorfault.base.errors import InputError, choices, short, unknown
+from rotorfault.maths.arrays import Array
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_file import load_vehicle
+
+FRAMES = {
+    "rotorfault": "world x forward, y left, z up; body the same",
+    "ned": "world x north, y east, z down; body x forward, y right, z down",
+}
+"""Frames that are converted between, with their axes."""
+
+
+class Kind(NamedTuple):
+    """What is converted from one frame to another."""
+
+    names: tuple[str, ...]  # of the components
+    signs: tuple[float, ...]  # factors of the components, the same both ways
+    meaning: str
+
+
+KINDS = {
+    "position": Kind(("x", "y", "z"), (1.0, -1.0, -1.0), "in the world"),
+    "velocity": Kind(("x", "y", "z"), (1.0, -1.0, -1.0), "in the world"),
+    "acceleration": Kind(("x", "y", "z"), (1.0, -1.0, -1.0), "in the world"),
+    "rates": Kind(("p", "q", "r"), (1.0, -1.0, -1.0), "of the body, about its axes"),
+    "quaternion": Kind(("w", "x", "y", "z"), (1.0, 1.0, -1.0, -1.0), "attitude, body to world, scalar first"),
+    "euler": Kind(("roll", "pitch", "yaw"), (1.0, -1.0, -1.0), "attitude, rad or degrees"),
+}
+"""Kinds of values that depend on frames."""
+
+MOTORS = "motors"
+CORNERS = ("front right", "rear left", "front left", "rear right")
+"""Where the motors of an X quadrotor are, in PX4's order."""
+ORDERS = {
+    "px4": CORNERS,
+    "ardupilot": CORNERS,
+    "betaflight": ("rear right", "front right", "rear left", "front left"),
+    "crazyflie": ("front right", "rear right", "rear left", "front left"),
+}
+"""Where motors 1, 2, 3, 4 are. Propellers at the front right and rear left turn counter-clockwise in all of them."""
+_COUNTER_CLOCKWISE = ("front right", "rear left")
+
+
+class Layout(NamedTuple):
+    """The motors of an X quadrotor."""
+
+    corners: tuple[str, ...]  # where motors 1, 2, 3, 4 are, of `CORNERS`
+    clockwise: tuple[bool, ...]  # whether their propellers turn clockwise, seen from above
+
+
+def layout(of: str | Path | Vehicle) -> Layout:
+    """Where the motors of an order, or of a vehicle, are, and how they turn.
+
+    Parameters
+    ----------
+    of : str, Path or Vehicle
+        ``"px4"``, ``"ardupilot"``, ``"betaflight"`` or ``"crazyflie"``; or an X quadrotor: name of a built-in
+        vehicle, path of its file, or the vehicle.
+
+    Raises
+    ------
+    InputError
+        If there is no such order or vehicle, or the vehicle has no rotor at each corner.
+    """
+    if isinstance(of, str) and of in ORDERS:
+        return Layout(ORDERS[of], tuple(corner not in _COUNTER_CLOCKWISE for corner in ORDERS[of]))
+    if isinstance(of, (str, Path)):
+        try:
+            vehicle = load_vehicle(of).vehicle
+        except InputError as error:
+            if str(of).endswith(".toml"):
+                raise
+            orders = choices([*ORDERS, "an X quadrotor's name", "FILE.toml"])
+            raise InputError(
+                f"{unknown('order of motors', of, list(ORDERS)).partition(' (')[0]} ({orders})"
+            ) from error
+    elif isinstance(of, Vehicle):
+        vehicle = of
+    else:
+        raise InputError(f"order of motors: got {short(of)}; {choices([*ORDERS, 'a vehicle'])}")
+    corners = tuple(_corner(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+    if set(corners) != set(CORNERS):
+        raise InputError(
+            f"{of if isinstance(of, (str, Path)) else 'vehicle'}: its rotors are {', '.join(corners)}; orders of "
+            "motors are known for X quadrotors, which have one each front right, rear left, front left and rear right"
+        )
+    return Layout(corners, tuple(sign > 0.0 for sign in vehicle.rotor_yaw_sign))
+
+
+def _corner(x: float, y: float) -> str:
+    """Where a rotor at x forward, y left of the centre of mass is, in m; on an axis it is at no corner."""
+    along = "front" if x > 1e-6 else "rear" if x < -1e-6 else ""
+    across = "left" if y > 1e-6 else "right" if y < -1e-6 else ""
+    return " ".join(filter(None, (along, across))) or "centre"
+
+
+def convert(kind: str, values: ArrayLike, source: str | Path | Vehicle, target: str | Path | Vehicle) -> Array:
+    """Values of one convention in another.
+
+    Parameters
+    ----------
+    kind : str
+        ``"position"``, ``"velocity"``, ``"acceleration"`` (in the world), ``"rates"`` (of the body), ``"quaternion"``
+        (scalar first, body to world), ``"euler"`` (roll, pitch, yaw), or ``"motors"``: a value per motor, in the
+        order of their numbers.
+    values : array_like, shape (..., 3) or (..., 4)
+        In any unit, which stays; four components for quaternions and motors.
+    source, target : str, Path or Vehicle
+        ``"rotorfault"`` or ``"ned"`` (north, east, down with a body of forward, right, down: PX4 and ArduPilot). For
+        motors ``"px4"``, ``"ardupilot"``, ``"betaflight"``, ``"crazyflie"``, or an X quadrotor: name of a built-in
+        vehicle, path of its file, or the vehicle.
+
+    Returns
+    -------
+    array
+        Of the same shape.
+
+    Raises
+    ------
+    InputError
+        If kind, source or target is unknown, or the values are no such numbers.
+
+    Examples
+    --------
+    >>> import rotorfault as rf
+    >>> rf.convert("position", [1.0, 2.0, 3.0], "rotorfault", "ned")
+    array([ 1., -2., -3.])
+    >>> rf.convert("motors", [10, 20, 30, 40], "px4", "crazyflie-2.1")
+    array([10., 20., 40., 30.])
+    """
+    if kind == MOTORS:
+        before, after = layout(source), layout(target)
+        numbers = _numbers(kind, values, ("1", "2", "3", "4"))
+        return numbers[..., [before.corners.index(corner) for corner in after.corners]]
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(unknown("kind of value", kind, [*KINDS, MOTORS]))
+    for frame in (source, target):
+        if not isinstance(frame, str) or frame not in FRAMES:
+            hint = "; its frames are 'ned'" if frame in ("px4", "ardupilot") else ""
+            raise InputError(unknown("frame", frame, list(FRAMES)) + hint)
+    numbers = _numbers(kind, values, KINDS[kind].names)
+    # Adding 0 makes 0 of -0, which nobody wants to read.
+    return numbers.copy() if source == target else numbers * np.array(KINDS[kind].signs) + 0.0
+
+
+def _numbers(kind: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
+    """Values as an array whose last axis has these components."""
+    try:
+        found = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        found = np.asarray(None)
+    if found.dtype.kind not in "iuf" or not found.ndim or found.shape[-1] != len(names):
+        raise InputError(
+            f"{kind}: got {short(values)}; allowed: {len(names)} numbers ({', '.join(names)}), or rows of them"
+        )
+    return found.astype(float)
