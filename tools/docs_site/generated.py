@@ -87,7 +87,7 @@ def api_pages() -> dict[str, str]:
         index += [f"## {title}", "", f"{says} [In full]({page}.md).", "", "| name | |", "| --- | --- |"]
         lines = [f"# {title}", "", says, ""]
         for name in names:
-            index.append(f"| [`{name}`]({page}.md#rotorfault.{name}) | {_cell(_summary(name))} |")
+            index.append(f"| {{py:obj}}`{name} <rotorfault.{name}>` | {_cell(_summary(name))} |")
             thing = getattr(rotorfault, name)
             kind = "autofunction"
             if isinstance(thing, type):
