@@ -48,7 +48,6 @@ CHILDREN: dict[str, list[str]] = {
         "contributing",
         "security",
     ],
-    "reference/api/index": ["reference/api/*"],
 }  # fmt: skip
 
 # Files of the repository that are pages of the site, by where they lie.
@@ -95,3 +94,5 @@ API: dict[str, tuple[str, str, list[str]]] = {
         ["InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "VehicleWarning"],
     ),
 }  # fmt: skip
+
+CHILDREN["reference/api/index"] = [f"reference/api/{page}" for page in API]
