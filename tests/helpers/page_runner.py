@@ -29,6 +29,8 @@ BLOCK = re.compile(
 )
 ELSEWHERE = "<!-- run by: "
 """Begins the comment of a page whose code another test runs, with more to say about it."""
+UNSEEN = {"--no-figures", "--no-report"}
+"""Options that change what is written, and nothing of what is printed but the names of the files."""
 SEARCH = {"generations": "1", "population": "4", "neighbours": "1"}
 
 
@@ -62,11 +64,13 @@ def lines_of(body: str) -> list[str]:
 
 
 def smaller(words: list[str]) -> list[str]:
-    """A command with what only makes it take long made small: figures, and the generations of a search."""
+    """A command with what only makes it take long made small: figures, reports, generations of a search."""
     name, *rest = words
     if name == "tune":
         rest = _without(rest, [f"--{option}" for option in SEARCH])
         rest += [word for option, value in SEARCH.items() for word in (f"--{option}", value)]
+    elif name == "campaign" and "--report-only" not in rest:
+        rest.append("--no-report")
     options = {o for p in typer.main.get_command(app).commands[name].params for o in (*p.opts, *p.secondary_opts)}  # type: ignore[attr-defined]
     if "--no-figures" in options and "--no-figures" not in rest:
         rest.append("--no-figures")
@@ -128,7 +132,7 @@ def run_page(path: Path, folder: Path, long: bool = False) -> int:
                         known(words)
                         continue
                     given = words[1:] if long else smaller(words[1:])
-                    changed = changed or set(given) - {"--no-figures"} != set(words[1:]) - {"--no-figures"}
+                    changed = changed or set(given) - UNSEEN != set(words[1:]) - UNSEEN
                     result = run(*given)
                     assert result.returncode == 0, (path.name, line, result.stdout, result.stderr)
                     printed += [result.stderr, result.stdout]

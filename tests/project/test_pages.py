@@ -57,5 +57,5 @@ def test_only_what_takes_long_is_made_smaller() -> None:
     tune = smaller(["tune", "smc", "--generations", "60", "--out", "a.toml"])
     assert tune[:4] == ["tune", "smc", "--out", "a.toml"]
     assert tune[4:6] == ["--generations", "1"]
-    assert smaller(["campaign", "two-rotors", "--budget", "13000"]) == ["campaign", "two-rotors", "--budget", "13000"]
+    assert smaller(["campaign", "two-rotors", "--budget", "13000"])[3:] == ["13000", "--no-report"]
     assert smaller(["list", "winds"]) == ["list", "winds"]
