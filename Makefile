@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper ranges test test-numpy test-bounds fuzz lint types bench peers maps benchmarks clean \
+.PHONY: help venv paper ranges test test-numpy test-bounds web fuzz lint types bench peers maps benchmarks clean \
   check-python
 
 help: ## List the targets
@@ -78,6 +78,9 @@ test-bounds: | check-python ## Run a quick part of the tests with the lowest ver
 	.venv-newest/$(BIN)/python -m pip install --quiet --upgrade -e '.[$(BOUNDS_EXTRAS)]' $(BOUNDS_TOOLS)
 	.venv-lowest/$(BIN)/python -m pytest -n 2 $(BOUNDS_TESTS)
 	.venv-newest/$(BIN)/python -m pytest -n 2 $(BOUNDS_TESTS)
+
+web: ## Bundle the program of the flight page anew, after a change in web/ (needs Node.js; the bundle is committed)
+	cd web && npm install --no-package-lock --no-audit --no-fund --silent && node build.mjs
 
 fuzz: .venv/.stamp-develop ## Try 10,000 inputs that nobody meant, and print counts (COUNT=, FIRST= for others)
 	.venv/$(BIN)/python tools/fuzz.py --count $(or $(COUNT),10000) --first $(or $(FIRST),1)

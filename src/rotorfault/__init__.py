@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rotorfault.flight.flight import Flight, load
     from rotorfault.flight.fly import fly, fly_all, repeat
     from rotorfault.flight.many import Flights, fly_many
+    from rotorfault.flight.view import view
     from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
     from rotorfault.maths.rotation import Quat
     from rotorfault.model.block import Context, Nothing
@@ -130,6 +131,7 @@ _HOME = {
     "trim_report": "analysis.trim",
     "tune": "tuning.search",
     "vehicle_names": "model.vehicle_file",
+    "view": "flight.view",
 }
 _UNDER_ANOTHER_NAME = {"Settings": "Strict"}
 
@@ -209,6 +211,7 @@ __all__ = [
     "trim_report",
     "tune",
     "vehicle_names",
+    "view",
 ]
 
 

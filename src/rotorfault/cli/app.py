@@ -73,7 +73,7 @@ def _root(
     pass
 
 
-def finish(flight: Flight, folder: Path, figures: bool) -> None:
+def finish(flight: Flight, folder: Path, figures: bool, page: bool = False) -> None:
     """Print the numbers of a flight and write its files.
 
     Parameters
@@ -83,9 +83,11 @@ def finish(flight: Flight, folder: Path, figures: bool) -> None:
         For its files.
     figures : bool
         Whether figures are drawn.
+    page : bool
+        Whether the flight's page is written.
     """
     say(str(flight.summary()))
-    written = flight.write(folder, with_figures=figures)
+    written = flight.write(folder, with_figures=figures, with_page=page)
     say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
     if flight.outcome.kind == "interrupted":
         raise stopped(f"interrupted; {folder} holds the flight up to {flight.outcome.time:g} s")

@@ -1,4 +1,4 @@
-"""The commands `rotorfault fly` and `rotorfault compare`."""
+"""The commands `rotorfault fly`, `rotorfault compare` and `rotorfault view`."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ def fly(
     repeat: Annotated[
         Path | None, typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
     ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Write the flight's page as well: flight.html.")] = False,
     allow_code: AllowCode = False,
 ) -> None:
     """Fly a scenario: print what happened, write flight.nc, summary.json and figures.
@@ -55,7 +56,7 @@ def fly(
         if any(value is not None for value in (scenario, controller, preset, assignments, seed)):
             raise InputError("--repeat takes scenario, controller and settings from the file; give it alone")
         folder = output_folder(out or Path("results") / "repeat")
-        finish(fly_again(repeat, engine, allow_code=allow_code), folder, figures)
+        finish(fly_again(repeat, engine, allow_code=allow_code), folder, figures, view)
         return
     if scenario is None:
         raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
@@ -66,7 +67,7 @@ def fly(
     # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
     folder = out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")
     output_folder(folder)
-    finish(_flown(checked, engine), folder, figures)
+    finish(_flown(checked, engine), folder, figures, view)
 
 
 def _name(scenario: Scenario) -> str:
@@ -119,3 +120,25 @@ def compare(
     if figures:
         written = compared.save_plots(folder)
         say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+
+
+@app.command()
+def view(
+    flights: Annotated[list[Path], typer.Argument(metavar="FLIGHT.nc ...", help="One to six flight files.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="The page; flight.html beside the first flight else."),
+    ] = None,
+) -> None:
+    """Write a page that replays flights in 3-D, with plots, events and diagnosis: one file that opens offline.
+
+    Several flights share one time: one is looked at and the others are ghosts, or all stand side by side.
+
+    Example: rotorfault view results/a/flight.nc results/b/flight.nc --out a-b.html
+    """
+    from rotorfault.flight.view import view as write_view
+
+    path = out or flights[0].with_name("flight.html")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"--out: got {path}; allowed: a file that ends in .html, such as {path.name}.html")
+    say(f"wrote {write_view(list(flights), out=path)}; open it in a browser")

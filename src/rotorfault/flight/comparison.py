@@ -12,20 +12,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rotorfault.base.errors import InputError, short
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.plain_text import one_line
 from rotorfault.base.text_table import terminal_width
-from rotorfault.flight.flight import Flight, load
+from rotorfault.flight.flight import Flight
+from rotorfault.flight.given import Given, labelled
 from rotorfault.results.score_table import ScoreTable
 from rotorfault.results.text import UNTIL_LOST, comparison
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Given = Flight | str | Path
-_ALLOWED = "two or more flights or paths of flight files, in a list or, with labels, as {'label': flight}"
 
 
 @final
@@ -123,6 +120,22 @@ class Comparison:
 
         return figures.save(self.plot(), Path(folder))
 
+    def view(self, path: str | Path) -> Path:
+        """Write a page that replays the flights, one file that opens offline; its path.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Raises
+        ------
+        InputError
+            If there are more than six flights, one has no records, or the folder does not exist.
+        """
+        from rotorfault.flight.view import view
+
+        return view(self.flights, out=path)
+
 
 def compare(*flights: Given | Sequence[Given] | Mapping[str, Given]) -> Comparison:
     """Put flights side by side, as the command ``rotorfault compare`` does.
@@ -143,42 +156,7 @@ def compare(*flights: Given | Sequence[Given] | Mapping[str, Given]) -> Comparis
     InputError
         If they are no flights, fewer than two, or a file cannot be read.
     """
-    given: Any = flights[0] if len(flights) == 1 and not isinstance(flights[0], (str, Path, Flight)) else flights
-    if isinstance(given, Mapping):
-        if not all(isinstance(label, str) for label in given):
-            raise InputError(f"compare: got {short(list(given))} as labels; allowed: texts")
-        return Comparison(_two(dict(zip(given, _loaded(list(given.values())), strict=True))))
-    if not isinstance(given, (list, tuple)):
-        raise InputError(f"compare: got {short(given)}; allowed: {_ALLOWED}")
-    loaded = _loaded(given)
-    return Comparison(_two(dict(zip(_labels(given, loaded), loaded, strict=True))))
-
-
-def _two(flights: dict[str, Flight]) -> dict[str, Flight]:
-    if len(flights) < 2:
-        raise InputError(f"compare: got {len(flights)} flight; allowed: {_ALLOWED}")
-    return flights
-
-
-def _loaded(given: Sequence[Any]) -> list[Flight]:
-    for one in given:
-        if not isinstance(one, (Flight, str, Path)):
-            raise InputError(f"compare: got {short(one)}; allowed: {_ALLOWED}")
-    return [one if isinstance(one, Flight) else load(one) for one in given]
-
-
-def _labels(given: Sequence[Given], flights: Sequence[Flight]) -> list[str]:
-    """Labels that tell flights apart: the controller, with folder or scenario where that is not enough."""
-    labels = [flight.label for flight in flights]
-    if len(set(labels)) < len(labels):
-        places = [
-            flight.scenario_name if isinstance(one, Flight) else Path(one).resolve().parent.name
-            for one, flight in zip(given, flights, strict=True)
-        ]
-        labels = [f"{label} ({place})" for label, place in zip(labels, places, strict=True)]
-    if len(set(labels)) < len(labels):
-        labels = [f"{label} {number}" for number, label in enumerate(labels, start=1)]
-    return labels
+    return Comparison(labelled("compare", flights, 2))
 
 
 def _column(values: list[Any]) -> Any:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from rotorfault.pages.flight_page import Shown
+
 
 class Summary(dict[str, Any]):
     """Numbers of a flight; prints readably."""
@@ -55,6 +57,8 @@ class Flight:
         How and when it ended.
     scores : mapping
         Its numbers, as a row of `rotorfault.results.score_table`: counted in flight, whatever was recorded.
+    source : str
+        The file that it was read from or saved to; empty if there is none.
     """
 
     def __init__(
@@ -65,6 +69,7 @@ class Flight:
         scenario: Scenario | None = None,
     ) -> None:
         self._data, self.outcome, self.scores, self.scenario = data, outcome, scores, scenario
+        self.source = ""
 
     def __repr__(self) -> str:
         return cut(f"<flight of {cut(self._data.attrs['scenario'])} by {cut(self.label)}: {self.outcome}>", LONGEST)
@@ -116,6 +121,34 @@ class Flight:
 
         return figures.draw(self.data)
 
+    def view(self, path: str | Path) -> Path:
+        """Write a page that replays the flight in 3-D, one file that opens offline; its path.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Raises
+        ------
+        InputError
+            If the flight has no records, or the folder does not exist.
+        """
+        from rotorfault.pages.flight_page import write_page
+
+        return write_page([self.shown(self.label)], Path(path))
+
+    def shown(self, label: str) -> Shown:
+        """The flight as a page shows it.
+
+        Parameters
+        ----------
+        label : str
+            What it is called there.
+        """
+        from rotorfault.pages.flight_page import Shown
+
+        return Shown(label, self.records(), rows(self.summary()), self.source)
+
     def to_csv(self, path: str | Path, every: int = 1, units: bool = True) -> Path:
         """Write all signals as one table, a row per record and a column per component.
 
@@ -134,9 +167,9 @@ class Flight:
         InputError
             If `every` is no whole number from 1 on, or the folder does not exist.
         """
-        return write_csv(self._arrays(), Path(path), every, units)
+        return write_csv(self.records(), Path(path), every, units)
 
-    def _arrays(self) -> FlightData:
+    def records(self) -> FlightData:
         """The records as plain arrays, on the same memory."""
         if isinstance(self._data, FlightData):
             return self._data
@@ -153,11 +186,12 @@ class Flight:
             If the folder does not exist.
         """
         path = Path(path)
-        write_netcdf(sealed(self._arrays()), path)
+        write_netcdf(sealed(self.records()), path)
+        self.source = str(path)
         return path
 
-    def write(self, folder: str | Path, with_figures: bool = True) -> list[Path]:
-        """Write ``flight.nc``, ``summary.json`` and the figures into a folder.
+    def write(self, folder: str | Path, with_figures: bool = True, with_page: bool = False) -> list[Path]:
+        """Write ``flight.nc``, ``summary.json``, the figures and the page ``flight.html`` into a folder.
 
         Raises
         ------
@@ -174,6 +208,8 @@ class Flight:
                 from rotorfault.report import figures
 
                 written += figures.save(self.plot(), folder)
+            if with_page:
+                written.append(self.view(folder / "flight.html"))
         return written
 
 
@@ -190,4 +226,6 @@ def load(path: str | Path) -> Flight:
 
     data = dataset.read_netcdf(path)
     scores = require_whole(dataset.as_flight_data(data), path)
-    return Flight(data, Outcome(str(data.attrs["outcome"]), float(data.attrs["end_time"])), scores)
+    flight = Flight(data, Outcome(str(data.attrs["outcome"]), float(data.attrs["end_time"])), scores)
+    flight.source = str(path)
+    return flight

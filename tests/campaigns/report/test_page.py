@@ -16,7 +16,7 @@ from rotorfault.campaigns.grades import GRADES
 from rotorfault.campaigns.report import charts, curves, report
 from rotorfault.campaigns.report.answer import answer
 from rotorfault.campaigns.report.maps import Maps, maps
-from rotorfault.report.page_style import STYLE
+from rotorfault.pages.style import STYLE
 
 
 class Parsed(HTMLParser):

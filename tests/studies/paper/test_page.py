@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from rotorfault.base.files import write_atomically
-from rotorfault.report.page_style import STYLE
+from rotorfault.pages.style import STYLE
 from rotorfault.studies.paper import answer
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.page import PICTURE, Page, render

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -23,7 +22,7 @@ from rotorfault.campaigns.report.flown import flown, quoted
 from rotorfault.campaigns.report.maps import Maps, VariantMap
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.loop.scores import RECOVERED
-from rotorfault.report.page_style import environment
+from rotorfault.pages.style import environment, script_data
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 MEANINGS = {
@@ -71,7 +70,7 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         possible=[_possible(variant) for variant in maps.variants],
         coarse=any(coarse(view) for view in maps.views[:2]),
         sections=[{k: v for k, v in section.items() if k != "spec"} for section in sections],
-        specs=_script([section["spec"] for section in sections]),
+        specs=script_data([section["spec"] for section in sections]),
         slices=slices(maps),
         error=f"{100.0 * (1.0 - maps.study.refine.level):.3g} %",
         rows=rows[:MOST_ROWS],
@@ -120,9 +119,3 @@ def _cells(possible: Array) -> str:
     """In how many cells hover is possible."""
     depends = int(np.isnan(possible).sum())
     return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")
-
-
-def _script(data: object) -> Markup:
-    """Data for a script element: nothing in it can end the element."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return Markup(text.replace("<", "\\u003c"))

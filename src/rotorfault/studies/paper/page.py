@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from rotorfault.autopilot.presets import record as record_of
 from rotorfault.base.versions import versions
-from rotorfault.report.page_style import environment
+from rotorfault.pages.style import environment
 from rotorfault.studies.paper import ablation, answer, figures, range_tables, ranges, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
 from rotorfault.studies.paper.verdicts import Claim

@@ -13,6 +13,7 @@ A page is one file that opens offline, so it holds its style itself: a template 
 
 from __future__ import annotations
 
+import json
 import re
 
 from jinja2 import Environment, StrictUndefined
@@ -97,3 +98,15 @@ def coded(text: str) -> Markup:
         Escaped here.
     """
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def script_data(data: object) -> Markup:
+    """Data for a script element: nothing in it can end the element.
+
+    Parameters
+    ----------
+    data : object
+        What JSON holds, without NaN.
+    """
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c"))

@@ -1,0 +1,228 @@
+"""The page of a flight, or of up to six side by side: a replay in 3-D, plots, events in words, provenance.
+
+One HTML file that opens offline, without a server. It is built from the vehicle and from the signals that the parts
+of the loop recorded, so it takes any number of rotors and any controller; without a vehicle the replay has a body and
+no rotors. The program of the page is ``web/`` in the repository, bundled by ``make web``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from markupsafe import Markup
+
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import in_folder, write_atomically
+from rotorfault.base.plain_text import one_line
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle_file import VehicleFile
+from rotorfault.pages.panels import Panel, derived, panels
+from rotorfault.pages.style import environment, script_data
+from rotorfault.pages.tracks import packed, packed_times, thinned
+from rotorfault.pages.verdict import headline, true_vehicle
+from rotorfault.results.events import events
+from rotorfault.results.flight_data import FlightData
+
+MOST = 6  # flights on a page: as many as there are colours that colour-blind readers tell apart
+ROOM = 5_500_000  # characters of data: the page stays below 8 MB with its program
+DENSE = 0.1  # s around events in which no record is left out
+LONGEST = 200  # characters of a name that are shown
+
+
+class Shown(NamedTuple):
+    """A flight as the page is to show it."""
+
+    label: str
+    data: FlightData
+    rows: Sequence[tuple[str, str]] = ()  # label and text of each line of its summary
+    source: str = ""  # the file, as commands are to name it; empty if there is none
+
+
+def write_page(flights: Sequence[Shown], path: Path) -> Path:
+    """Write the page of some flights.
+
+    Parameters
+    ----------
+    flights : sequence of Shown
+        One to six.
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If there are none or too many, one has no records, or the folder does not exist.
+    """
+    html = page(flights)
+    write_atomically(in_folder(path), lambda temporary: temporary.write_text(html, encoding="utf-8"))
+    return path
+
+
+def page(flights: Sequence[Shown]) -> str:
+    """The page's HTML; see `write_page`."""
+    if not 1 <= len(flights) <= MOST:
+        raise InputError(f"got {len(flights)} flights; allowed on one page: 1 to {MOST}")
+    for flight in flights:
+        if not len(flight.data["time"].values):
+            raise InputError(f"{one_line(flight.label)}: has no records; nothing to show")
+    folder = resources.files("rotorfault.pages")
+    names = " and ".join(dict.fromkeys(_short(flight.data.attrs.get("scenario", "flight")) for flight in flights))
+    made = environment()
+    payload = _payload(flights)
+    return made.from_string((folder / "flight.html.j2").read_text(encoding="utf-8")).render(
+        title=f"{names} · rotorfault",
+        heading=names,
+        flights=[{"label": _short(flight.label), "facts": headline(flight.data)} for flight in flights],
+        records=[_provenance(flight) for flight in flights],
+        thinned=_thinned(payload),
+        data=script_data(payload),
+        css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
+        program=Markup((folder / "bundle" / "flight.js").read_text(encoding="utf-8")),
+    )  # fmt: skip
+
+
+def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
+    """All that the program of the page reads, thinned until it has room."""
+    whole = [_complete(flight) for flight in flights]
+    values = sum(np.asarray(v.values).size for data, _ in whole for v in data.variables.values())
+    every = max(1, int(values * 0.6 / ROOM))  # packed, a value takes half a character or more
+    while True:
+        tracks = [_tracks(data, every) for data, _ in whole]
+        if sum(size for _, size in tracks) <= ROOM:
+            break
+        every *= 2
+    return {
+        "flights": [
+            {
+                "label": _short(flight.label),
+                "vehicle": _vehicle(data, vehicle),
+                "events": [event._asdict() for event in events(flight.data)],
+                "panels": [_panel(panel) for panel in panels(data, _limits(data))],
+                "ground": _ground(data),
+                "rows": [list(row) for row in flight.rows],
+                **track,
+            }
+            for flight, (data, vehicle), (track, _) in zip(flights, whole, tracks, strict=True)
+        ]
+    }
+
+
+def _thinned(payload: Mapping[str, Any]) -> str:
+    """What the page says of records that it leaves out."""
+    most = max(int(flight["every"]) for flight in payload["flights"])
+    return "" if most == 1 else f", and one of {most} records is kept but around events, where all are"
+
+
+def _complete(flight: Shown) -> tuple[FlightData, Vehicle | None]:
+    vehicle = true_vehicle(flight.data)
+    return derived(flight.data, vehicle), vehicle
+
+
+def _tracks(data: FlightData, every: int) -> tuple[dict[str, Any], int]:
+    """The signals of a flight, packed, and how many characters they take."""
+    time = np.asarray(data["time"].values, dtype=float)
+    moments = [event.time for event in islice(events(data), 60)]
+    keep = thinned(time, every, moments, DENSE)
+    signals: dict[str, Any] = {}
+    size = 0
+    for name, variable in data.variables.items():
+        if variable.dims[:1] != ("time",) or not np.issubdtype(np.asarray(variable.values).dtype, np.number):
+            continue
+        values = np.asarray(variable.values, dtype=float)[keep].reshape(len(keep), -1)
+        signals[name] = {
+            "unit": str(variable.attrs.get("units", "1")),
+            "about": str(variable.attrs.get("long_name", "")),
+            "columns": _columns(data, variable.dims[1:], np.asarray(variable.values).shape[1:]),
+            **packed(values),
+        }
+        size += len(signals[name]["data"])
+    return {"time": packed_times(time[keep]), "every": every, "records": len(time), "signals": signals}, size
+
+
+def _columns(data: FlightData, dims: Sequence[str], shape: Sequence[int]) -> list[str]:
+    """Names of a signal's columns, such as ``x`` or ``roll pitch``."""
+    names = [[str(value) for value in data.coordinates[dim].values] for dim in dims]
+    return [" ".join(names[d][i] for d, i in enumerate(at)) for at in np.ndindex(*shape)]
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {**panel._asdict(), "curves": [curve._asdict() for curve in panel.curves]}
+
+
+def _limits(data: FlightData) -> dict[str, float]:
+    return {key: float(data.attrs[key]) for key in ("thrust_min", "thrust_max") if key in data.attrs}
+
+
+def _configuration(data: FlightData) -> Mapping[str, Any]:
+    try:
+        tables = json.loads(data.attrs.get("configuration", "{}"))
+    except ValueError:
+        return {}
+    return tables if isinstance(tables, dict) else {}
+
+
+def _vehicle(data: FlightData, vehicle: Vehicle | None) -> dict[str, Any] | None:
+    """What is drawn of a vehicle: rotors where they are, and what their thrusts do."""
+    if vehicle is None:
+        return None
+    file = VehicleFile.model_validate(_configuration(data)["vehicle"])
+    count = len(file.rotor)
+    units = [PerRotor.of([float(i == k) for i in range(count)]) for k in range(count)]
+    wrenches = [wrench_of(vehicle, unit) for unit in units]
+    return {
+        "name": _short(file.name),
+        "weight": float(vehicle.mass * vehicle.gravity),
+        "gain": float(vehicle.rotor_gain),
+        **_limits(data),
+        "rotors": [
+            {
+                "name": _short(rotor.name),
+                "position": [rotor.x.value, rotor.y.value, 0.0],
+                "axis": [0.0, 0.0, 1.0],
+                "turn": -1.0 if rotor.yaw == "+" else 1.0,  # about its axis: drag turns the body the other way
+                "wrench": [float(w.thrust), *map(float, w.torque_B)],
+            }
+            for rotor, w in zip(file.rotor, wrenches, strict=True)
+        ],
+    }
+
+
+def _ground(data: FlightData) -> float | None:
+    ground = _configuration(data).get("ground")
+    height = ground.get("height") if isinstance(ground, dict) else ground
+    return float(height) if isinstance(height, (int, float)) and not isinstance(height, bool) else None
+
+
+def _provenance(flight: Shown) -> dict[str, Any]:
+    """What flew, with which versions, and the command that flies it again."""
+    attributes = flight.data.attrs
+    parts = json.loads(attributes.get("parts", "[]"))
+    versions = json.loads(attributes.get("versions", "{}"))
+    return {
+        "label": _short(flight.label),
+        "description": _short(_configuration(flight.data).get("description", ""), 400),
+        "facts": [
+            ("scenario", _short(attributes.get("scenario", ""))),
+            ("controller", _short(attributes.get("controller", ""))),
+            ("preset", _short(attributes.get("preset", ""))),
+            ("vehicle", _short(attributes.get("vehicle", ""))),
+            ("engine", _short(attributes.get("engine", ""))),
+            ("seed", str(attributes.get("seed", ""))),
+            ("parts", ", ".join(f"{_short(part['slot'])} {_short(part['kind'])}" for part in parts)),
+            ("flown with", ", ".join(f"{_short(name)} {_short(value)}" for name, value in versions.items())),
+        ],
+        "rows": flight.rows,
+        "command": f"rotorfault fly --repeat {flight.source}" if flight.source else "",
+    }
+
+
+def _short(text: object, most: int = LONGEST) -> str:
+    """Somebody's text in one line and not without end."""
+    line = one_line(str(text))
+    return line if len(line) <= most else f"{line[: most - 1]}…"

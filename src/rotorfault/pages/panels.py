@@ -1,0 +1,206 @@
+"""The plots of a flight's page: which signals stand together, and in which role, for any vehicle and any parts.
+
+Nothing here counts to four or knows a law. A panel is left out where the flight has none of its signals; what no
+panel shows is still on the page, for the reader to choose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from rotorfault.autopilot.diagnosis.decision import second_best
+from rotorfault.maths.arrays import ANGLES, AXES, Array
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.results.flight_data import FlightData, Variable
+
+TRUE, BELIEVED, COMMAND, ASKED, LIMIT, THRESHOLD = "true", "believed", "command", "asked", "limit", "threshold"
+
+
+class Curve(NamedTuple):
+    """One curve of a panel."""
+
+    signal: str
+    column: int
+    label: str
+    role: str  # true, believed, command, asked, limit or threshold: a look each
+
+
+class Panel(NamedTuple):
+    """One plot over time."""
+
+    name: str  # unique on the page
+    group: str  # the heading it stands under
+    title: str
+    unit: str
+    curves: tuple[Curve, ...]
+    shade: tuple[str, int] | None = None  # signal and column: shaded where it is 1
+    levels: tuple[tuple[float, str], ...] = ()  # constant lines, with what they are
+
+
+def derived(data: FlightData, vehicle: Vehicle | None) -> FlightData:
+    """The records with what follows from them: errors, believed thrust, missing thrust, the wrench that was given.
+
+    Parameters
+    ----------
+    data : FlightData
+    vehicle : Vehicle, optional
+        For the wrench; without it there is none.
+    """
+    new: dict[str, Variable] = {}
+
+    def add(name: str, values: Array, like: str, meaning: str) -> None:
+        attributes = {**data[like].attrs, "long_name": meaning}
+        new[name] = Variable(data[like].dims[: values.ndim], values, attributes)
+
+    def has(*names: str) -> bool:
+        return all(name in data for name in names)
+
+    if has("position", "position_reference"):
+        error = _of(data, "position") - _of(data, "position_reference")
+        add("position_error", error, "position", "true position less desired position")
+    if has("expected_thrust", "loss_believed"):
+        believed = _of(data, "expected_thrust") * (1.0 - _of(data, "loss_believed"))
+        add(
+            "thrust_believed", believed, "expected_thrust", "thrust of each rotor as believed, with its believed loss"
+        )
+    if has("thrust_residual") and (residual := _of(data, "thrust_residual")).shape[1] == len(PerRotor.__slots__):
+        sound = np.asarray(second_best(PerRotor.of(residual.T)))
+        add(
+            "thrust_missing",
+            sound[:, None] - residual,
+            "thrust_residual",
+            "thrust that a rotor lacks beside a sound one",
+        )
+    if vehicle is not None and has("thrust", "thrust_demand", "torque_demand"):
+        given = wrench_of(vehicle, PerRotor.of(_of(data, "thrust").T))
+        add("thrust_given", np.asarray(given.thrust), "thrust_demand", "total thrust that the rotors gave")
+        torque = np.column_stack(list(given.torque_B))
+        add("torque_given", torque, "torque_demand", "torque that the rotors gave")
+    return FlightData({**data.variables, **new}, data.coordinates, data.attrs)
+
+
+def panels(data: FlightData, limits: Mapping[str, float]) -> list[Panel]:
+    """The panels of a flight whose derived signals were added.
+
+    Parameters
+    ----------
+    data : FlightData
+        As `derived` gives it.
+    limits : mapping of str to float
+        ``thrust_min`` and ``thrust_max`` of a rotor in N, where they are known.
+    """
+    found = [*_motion(data), *_rotors(data, limits), *_diagnosis(data), *_wrench(data)]
+    return [panel for panel in found if panel.curves]
+
+
+def _of(data: FlightData, name: str) -> Array:
+    return np.asarray(data[name].values, dtype=float)
+
+
+def _unit(data: FlightData, name: str) -> str:
+    return str(data[name].attrs.get("units", "1")) if name in data else "1"
+
+
+def _curves(data: FlightData, *wanted: Curve) -> tuple[Curve, ...]:
+    """Those of the curves that the flight has; no estimate that is the truth itself."""
+
+    def there(curve: Curve) -> bool:
+        if curve.signal not in data:
+            return False
+        shape = data[curve.signal].values.shape
+        return len(shape) <= 2 and curve.column < (shape[1] if len(shape) > 1 else 1)
+
+    found = [curve for curve in wanted if there(curve)]
+    truths = [_column(data, curve) for curve in found if curve.role == TRUE]
+    return tuple(
+        curve
+        for curve in found
+        if curve.role != BELIEVED or not any(np.array_equal(_column(data, curve), truth) for truth in truths)
+    )
+
+
+def _column(data: FlightData, curve: Curve) -> Array:
+    values = _of(data, curve.signal)
+    return values[:, curve.column] if values.ndim > 1 else values
+
+
+def _motion(data: FlightData) -> Iterator[Panel]:
+    for k, axis in enumerate(AXES):
+        curves = (
+            Curve("position", k, "true", TRUE),
+            Curve("position_estimated", k, "estimated", BELIEVED),
+            Curve("position_reference", k, "desired", ASKED),
+        )
+        yield Panel(f"position.{axis}", "Motion", f"position {axis}", "m", _curves(data, *curves))
+    for k, angle in enumerate(ANGLES):
+        curves = (
+            Curve("attitude", k, "true", TRUE),
+            Curve("attitude_estimated", k, "estimated", BELIEVED),
+            Curve("controller.attitude_command", k, "command of the position loop", ASKED),
+        )
+        if angle == "yaw":
+            curves = (*curves[:2], Curve("yaw_reference", 0, "desired", ASKED))
+        yield Panel(f"attitude.{angle}", "Motion", angle, "rad", _curves(data, *curves))
+
+
+def _rotors(data: FlightData, limits: Mapping[str, float]) -> Iterator[Panel]:
+    """Per rotor: command, thrust true and believed, limits, and where it is flagged."""
+    ends = (("least", limits.get("thrust_min")), ("greatest", limits.get("thrust_max")))
+    levels = tuple((value, word) for word, value in ends if value is not None)
+    for k, number in enumerate(_numbers(data, "thrust")):
+        curves = (
+            Curve("thrust", k, "true", TRUE),
+            Curve("thrust_believed", k, "believed", BELIEVED),
+            Curve("thrust_command", k, "command", COMMAND),
+        )
+        unit = _unit(data, "thrust")
+        yield Panel(
+            f"rotor.{number}", "Rotors", f"rotor {number}", unit, _curves(data, *curves), _flag(data, k), levels
+        )
+
+
+def _diagnosis(data: FlightData) -> Iterator[Panel]:
+    """Per rotor: the statistic against its threshold, and the evidence: loss estimated, believed and true."""
+    unit = _unit(data, "thrust_residual")
+    for k, number in enumerate(_numbers(data, "thrust_residual")):
+        missing = Curve("thrust_missing", k, "missing thrust", TRUE)
+        curves = [missing if "thrust_missing" in data else Curve("thrust_residual", k, "residual", TRUE)]
+        if _unit(data, "diagnosis.threshold") == unit:
+            curves.append(Curve("diagnosis.threshold", k, "threshold", THRESHOLD))
+        title = f"rotor {number}: statistic and threshold"
+        yield Panel(f"statistic.{number}", "Diagnosis", title, unit, _curves(data, *curves), _flag(data, k))
+        evidence = (
+            Curve("loss_true", k, "true loss", ASKED),
+            Curve("loss_estimated", k, "estimated", TRUE),
+            Curve("loss_believed", k, "believed", BELIEVED),
+        )
+        title = f"rotor {number}: loss of effectiveness"
+        yield Panel(f"loss.{number}", "Diagnosis", title, "1", _curves(data, *evidence), _flag(data, k))
+
+
+def _wrench(data: FlightData) -> Iterator[Panel]:
+    """Demanded against given, axis by axis."""
+    names = (("thrust", "thrust", 0), *((f"{angle} torque", "torque", k) for k, angle in enumerate(ANGLES)))
+    cut = {"thrust": 1, "roll torque": 0, "pitch torque": 0, "yaw torque": 2}
+    for title, kind, k in names:
+        curves = (
+            Curve(f"{kind}_given", k, "given by the rotors", TRUE),
+            Curve(f"{kind}_demand", k, "demanded", ASKED),
+        )
+        shade = ("given_up", cut[title]) if "given_up" in data else None
+        yield Panel(f"wrench.{title}", "Wrench", title, _unit(data, f"{kind}_demand"), _curves(data, *curves), shade)
+
+
+def _flag(data: FlightData, k: int) -> tuple[str, int] | None:
+    return ("fault_flag", k) if "fault_flag" in data else None
+
+
+def _numbers(data: FlightData, signal: str) -> list[int]:
+    """Numbers of the rotors that a signal has values of."""
+    if signal not in data or data[signal].values.ndim != 2:
+        return []
+    return list(range(1, data[signal].values.shape[1] + 1))
