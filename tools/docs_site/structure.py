@@ -58,7 +58,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
     "fly": (
         "Fly",
         "Single flights, many at once, and what comes back.",
-        ["fly", "fly_all", "repeat", "load", "Flight", "fly_many", "Flights", "compare", "Comparison"],
+        ["fly", "fly_all", "repeat", "load", "Flight", "fly_many", "Flights", "compare", "Comparison", "view"],
     ),
     "campaigns": ("Campaigns", "Maps of thousands of flights.", ["campaign", "Campaign"]),
     "before": (
@@ -95,4 +95,4 @@ API: dict[str, tuple[str, str, list[str]]] = {
     ),
 }  # fmt: skip
 
-CHILDREN["reference/api/index"] = [f"reference/api/{page}" for page in API]
+CHILDREN["reference/api/index"] = [*(f"reference/api/{page}" for page in API), "reference/api/*"]
