@@ -120,7 +120,7 @@ def run_page(path: Path, folder: Path, long: bool = False) -> int:
     names: dict[str, object] = {"__name__": "__main__"}
     count = 0
     with reader_folder(folder), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of searches that are too short to find anything; what a page shows is compared
+        warnings.simplefilter("ignore")  # of searches that are too short to find anything
         for block in blocks(path.read_text(encoding="utf-8")):
             if block.mark == "not run" or (block.mark == "long" and not long):
                 continue
@@ -155,7 +155,8 @@ def known(words: list[str]) -> None:
         targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
         assert {word for word in words[1:] if "=" not in word} <= targets, words
     else:
-        assert words[0] == "python" and (ROOT / words[1]).exists(), f"mark it with <!-- not run: why -->: {words}"
+        script = words[0] == "python" and (ROOT / words[1]).exists()
+        assert script, f"mark it with <!-- not run: why -->: {words}"
 
 
 def same(printed: str, said: str, page: str) -> None:
@@ -166,5 +167,6 @@ def same(printed: str, said: str, page: str) -> None:
         wanted = " ".join(line.split())
         if not wanted or wanted == "...":
             continue
-        assert wanted in have[place + 1 :], f"{page} shows a line that is not printed there: {line!r}; printed:\n{printed}"
+        found = wanted in have[place + 1 :]
+        assert found, f"{page} shows a line that is not printed there: {line!r}; printed:\n{printed}"
         place = have.index(wanted, place + 1)

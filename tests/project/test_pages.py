@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
+import json
 import os
+import re
 from pathlib import Path
 
 import pytest
 from gates import needs_simd
 from page_runner import ELSEWHERE, blocks, lines_of, run_page, same, smaller
-from places import DOCS, ROOT
+from places import DOCS, ROOT, SOURCE
 
 PAGES = [*sorted(DOCS.rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 LONG = os.environ.get("ROTORFAULT_LONG_PAGES") == "1"  # by `make docs-long`
@@ -33,8 +37,8 @@ def _ours(body: str) -> bool:
 def test_marks_have_reasons_and_are_needed(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     for block in CODE[path]:
-        if block.mark == "not run":
-            assert not any(line.startswith("rotorfault ") for line in lines_of(block.body)) or "machine" in block.reason
+        ours = any(line.startswith("rotorfault ") for line in lines_of(block.body) if block.language == "sh")
+        assert block.mark != "not run" or not ours or "machine" in block.reason
         assert not block.mark or len(block.reason.split()) >= 3
     assert text.count("<!-- long:") + text.count("<!-- not run:") == sum(bool(b.mark) for b in CODE[path])
     if ELSEWHERE in text:
@@ -59,3 +63,27 @@ def test_only_what_takes_long_is_made_smaller() -> None:
     assert tune[4:6] == ["--generations", "1"]
     assert smaller(["campaign", "two-rotors", "--budget", "13000"])[3:] == ["13000", "--no-report"]
     assert smaller(["list", "winds"]) == ["list", "winds"]
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.rglob("*.ipynb")), ids=lambda path: path.name)
+def test_a_notebook_is_kept_without_what_it_printed(path: Path) -> None:
+    """It is run whenever the site is built; output in the repository would be that of some other day."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    assert cells[0]["cell_type"] == "markdown"
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"]
+            assert cell["execution_count"] is None
+            compile("".join(cell["source"]), path.name, "exec")
+
+
+EXAMPLE = re.compile(r"^ +>>> ", re.MULTILINE)
+DOCTESTS = [path for path in sorted(SOURCE.rglob("*.py")) if EXAMPLE.search(path.read_text(encoding="utf-8"))]
+
+
+@pytest.mark.parametrize("path", DOCTESTS, ids=lambda path: path.relative_to(SOURCE).as_posix())
+def test_examples_in_docstrings_run(path: Path) -> None:
+    module = importlib.import_module(".".join(path.relative_to(SOURCE.parent).with_suffix("").parts))
+    found = doctest.testmod(module)
+    assert found.attempted
+    assert not found.failed

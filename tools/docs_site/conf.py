@@ -23,7 +23,7 @@ extensions = [
     "public_names",  # docstrings of what the package exports: tools/docs_site/public_names.py
 ]
 exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
-templates_path: list[str] = []
+smartquotes = False  # options begin with two hyphens
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
 # Markdown as on a forge: anchors of headings, $formulas$.
