@@ -69,4 +69,4 @@ html_theme_options = {
     "article_header_start": ["breadcrumbs"],
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = {"index": [], "**": ["sidebar-nav-bs"]}
+html_sidebars = {name: [] for name in ("index", "conventions", "survival", "paper")} | {"**": ["sidebar-nav-bs"]}

@@ -9,6 +9,7 @@ from structure import API
 
 import rotorfault
 from rotorfault.cli.main import app
+from rotorfault.model.block import Block
 
 
 def commands_page() -> str:
@@ -93,7 +94,9 @@ def api_pages() -> dict[str, str]:
             kind = "autofunction"
             if isinstance(thing, type):
                 kind = "autoexception" if issubclass(thing, Exception) else "autoclass"
-            members = ["   :members:"] if kind == "autoclass" and name not in ("Settings",) else []
+            members = ["   :members:", "   :exclude-members: model_config"] if kind == "autoclass" else []
+            if kind == "autoclass" and issubclass(thing, Block):
+                members.append("   :inherited-members: Generic")  # what a part of one's own has to write
             lines += ["```{eval-rst}", f".. {kind}:: rotorfault.{name}", *members, "```", ""]
         index.append("")
         pages[f"reference/api/{page}.md"] = "\n".join(lines)
