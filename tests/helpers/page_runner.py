@@ -27,7 +27,7 @@ BLOCK = re.compile(
     r"(?:<!-- (?P<mark>long|not run): (?P<reason>[^>]+) -->\n+)?(?:^|(?<=\n))```(?P<language>\w+)\n(?P<body>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
-ELSEWHERE = "<!-- run by: "
+ELSEWHERE = "\n<!-- run by: "
 """Begins the comment of a page whose code another test runs, with more to say about it."""
 UNSEEN = {"--no-figures", "--no-report"}
 """Options that change what is written, and nothing of what is printed but the names of the files."""
