@@ -20,6 +20,7 @@ COMMANDS = tuple(
 )
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"
+PAGES = "jinja2 takes longer to load than a flight takes to fly"
 OPTIONAL = "need not be installed"
 LAZY = {
     "rotorfault.__main__": {"rotorfault.cli.main": "Ctrl-C while it loads ends the program at once"},
@@ -31,7 +32,10 @@ LAZY = {
     "rotorfault.bench.flights": {"resource": "is not there on every system"},
     "rotorfault.bench.sdre": {"control": OPTIONAL, "ctrlsys": OPTIONAL, "slycot": OPTIONAL},
     "rotorfault.bench.study": {"rotorfault.bench.accuracy_figure": MATPLOTLIB},
-    "rotorfault.campaigns.api": {"rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load"},
+    "rotorfault.campaigns.api": {
+        "rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load",
+        "rotorfault.campaigns.report.kept": "brings what makes pages, which a campaign does not need",
+    },
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
     "rotorfault.base.frames": {
         "pandas": "need not be there, and takes long to load",
@@ -56,14 +60,22 @@ LAZY = {
         "rotorfault.engine.simd": "llvmlite need not be installed",
     },
     "rotorfault.engine.taylor": {"heyoka": OPTIONAL},
-    "rotorfault.flight.comparison": {"rotorfault.report.figures": MATPLOTLIB},
+    "rotorfault.flight.comparison": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.flight.view": PAGES},
     "rotorfault.flight.doubts": {
         "rotorfault.analysis.trim": "brings scipy, which takes longer to load than a flight to fly"
     },
-    "rotorfault.flight.flight": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.results.dataset": XARRAY},
+    "rotorfault.flight.flight": {
+        "rotorfault.report.figures": MATPLOTLIB,
+        "rotorfault.results.dataset": XARRAY,
+        "rotorfault.pages.flight_page": PAGES,
+    },
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
+    "rotorfault.results.exporters.mat": {"scipy.io": "takes longer to load than a flight to fly"},
+    "rotorfault.results.exporters.mcap": {"mcap.writer": OPTIONAL},
+    "rotorfault.results.exporters.parquet": {"pyarrow": "the same as scipy", "pyarrow.parquet": "the same"},
+    "rotorfault.results.exporters.rrd": {"rerun": OPTIONAL, "rerun.blueprint": OPTIONAL},
     "rotorfault.tuning.search": {"cma": OPTIONAL},
 }
 # Modules that load others by names that are data: only there may `import_module` stand, which hides from readers,

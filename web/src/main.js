@@ -2,7 +2,7 @@
 
 import 'uplot/dist/uPlot.min.css';
 import './page.css';
-import { AttainableSet } from './attainable.js';
+import { AttainableSet, tiltTorques } from './attainable.js';
 import { Clock, remember, wanted } from './clock.js';
 import { load } from './data.js';
 import { colourOf, onTheme, palette, startTheme } from './look.js';
@@ -140,7 +140,7 @@ async function start() {
   show(clock.time);
   clock.tell();
   // For tests and for the curious: the state of the page.
-  window.rotorfault = { clock, scene, plots, timeline, flights };
+  window.rotorfault = { clock, scene, plots, timeline, flights, tiltTorques };
   performance.mark('ready');
   document.body.dataset.ready = 'true';
 }

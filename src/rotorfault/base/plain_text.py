@@ -8,7 +8,9 @@ the name of a file.
 from __future__ import annotations
 
 import re
+import shlex
 import unicodedata
+from pathlib import Path
 
 MOST_BYTES = 100  # of a part of a file's name: all systems take 255, and names are put together
 # Of devices on Windows, whatever follows after a dot.
@@ -39,6 +41,18 @@ def _shown(character: str, keep: str) -> str:
     if character.isprintable() or character in keep or unicodedata.category(character) == "Zs":
         return character
     return character.encode("unicode_escape").decode("ascii")
+
+
+def argument(path: str | Path) -> str:
+    """A path as an argument of a command, to be copied into a shell.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+    place = str(path)
+    # Else it would be read as an option.
+    return shlex.quote(f"./{place}" if place.startswith("-") else place)
 
 
 def file_name(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any, final
 
 import pyarrow.compute as pc
 
-from rotorfault.base.bounds import require
+from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError, short
 from rotorfault.base.executors import executor_of
 from rotorfault.base.html import html_note, html_table
@@ -110,6 +110,25 @@ class Campaign:
 
         made_by = {**self._store.identity.versions, "source": self._store.identity.program}
         return write(self.study, self._store.table(), self.folder, made_by)
+
+    def keep_flights(self, cells: int) -> list[Path]:
+        """Keep pages of flights in the folder, in the cells whose success is nearest to one half; their paths.
+
+        Each is flown again, and stands on its page beside the same flight of the other variants. The page of the
+        campaign opens them, once `report` has made it anew.
+
+        Parameters
+        ----------
+        cells : int
+
+        Raises
+        ------
+        InputError
+            If it is no whole number from 1 to the cells that there are, or a flight needs code that is not allowed.
+        """
+        from rotorfault.campaigns.report.kept import keep
+
+        return keep(self.study, self.maps(), self.folder, whole_number(cells, "cells", 1, self.study.cells))
 
     def replay(
         self, identifier: int, *, controller: str | None = None, settings: Mapping[str, Any] | None = None

@@ -59,6 +59,14 @@ def campaign(
     report_only: Annotated[
         bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
     ] = False,
+    keep_flights: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="CELLS",
+            help="Keep flight pages of so many cells, those nearest to 50 % success: a click on the map opens them.",
+        ),
+    ] = None,
     allow_code: AllowCode = False,
 ) -> None:
     """Fly a survival campaign: thousands of flights over a map, most of them where success is uncertain.
@@ -85,6 +93,7 @@ def campaign(
             raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
         # A controller of the campaign may be named again, and so allowed.
         there = Campaign(out, allow_code=allow_code or controllers or False)
+        _keep(there, keep_flights)
         _report(there)
         say(str(there.answer()))
         return
@@ -100,8 +109,9 @@ def campaign(
         )  # fmt: skip
     except KeyboardInterrupt:
         raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
+    _keep(done, keep_flights)
     if report:
-        _report(done, done.page)
+        _report(done, None if keep_flights else done.page)
     say(str(done.answer()))
 
 
@@ -121,6 +131,7 @@ def replay(
     ] = None,
     assignments: Assignments = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    view: Annotated[bool, typer.Option("--view", help="Write the flight's page as well: flight.html.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for results; DIR-replays/ID if not given.")
     ] = None,
@@ -156,7 +167,7 @@ def replay(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # told below, in lines of their own
         flown = campaign.replay(flight, controller=controller, settings=settings)
-    finish(flown, target, figures)
+    finish(flown, target, figures, view)
     if changed:
         named = ", ".join(f"{key} = {short(value)}" for key, value in changes.items())
         say(f"not the flight of the table, but with {named}")
@@ -168,6 +179,17 @@ def replay(
         say("warning: this is not the flight of the table; its numbers are above", err=True)
     else:
         say("its numbers are those of the campaign's table")
+
+
+def _keep(campaign: Campaign, cells: int | None) -> None:
+    """Pages of flights, if any are to be kept."""
+    if cells is None:
+        return
+    try:
+        pages = campaign.keep_flights(cells)
+    except KeyboardInterrupt:
+        raise stopped("interrupted; the pages that were made are kept, so are all flights") from None
+    say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}")
 
 
 def _report(campaign: Campaign, page: Path | None = None) -> None:

@@ -13,12 +13,15 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 from rotorfault.results.flight_data import FlightData
 
 MERGE = 0.05  # s: what stops for less than that has not stopped
 JUMP = 0.02  # of a true loss from one record to the next: a fault that sets in, and no drift
 MOST = 12  # events of a kind on one rotor; a burst fault or a chattering limit has hundreds
+STEADY = 5  # records before and after a step
+WHEN = ("rotor", "time", "start")  # settings of a fault that its event tells by itself
 AT_LIMIT = 1e-9  # N
 STATES = 8  # values that a signal may take to count as a mode
 
@@ -33,6 +36,14 @@ class Event(NamedTuple):
     text: str
     rotor: int = 0  # number of the rotor, 0 for none
     until: float | None = None  # s, where it lasts
+
+
+class Span(NamedTuple):
+    """Time in which something holds, in s."""
+
+    start: float
+    end: float
+    broken: bool  # whether it stopped for a moment
 
 
 def events(data: FlightData) -> list[Event]:
@@ -95,38 +106,60 @@ def _faults(data: FlightData, time: Array, scores: Mapping[str, Any]) -> Iterato
     first = onsets(scores)
     for rotor, onset in first.items():
         loss = scores.get(f"loss_true.{rotor}")
-        kinds = ", ".join(_kinds(data, rotor))
-        share = f" {100.0 * loss:.3g} % of its thrust" if loss is not None else " thrust"
-        yield Event(
-            onset, "fault", f"rotor {rotor} loses{share}" if not kinds else _fault_text(rotor, kinds, loss), rotor
-        )
+        yield Event(onset, "fault", _fault_text(rotor, faults_of(data, rotor), loss), rotor)
     if "loss_true" not in data:
         return
     losses = np.asarray(data["loss_true"].values, dtype=float)
     for k in range(losses.shape[1]):
         onset = first.get(k + 1, np.inf)
-        steps = np.flatnonzero(np.abs(np.diff(losses[:, k])) > JUMP) + 1
-        later = [at for at in steps if time[at] > onset + MERGE]
+        later = [at for at in _steps(losses[:, k]) if time[at] > onset + MERGE]
         for at, more in _first(later):
             text = f"rotor {k + 1}: true loss now {100.0 * losses[at, k]:.3g} %{more}"
             yield Event(float(time[at]), "fault", text, k + 1)
 
 
-def _kinds(data: FlightData, rotor: int) -> list[str]:
-    """Kinds of the faults of a rotor that are no plain loss, as the scenario names them."""
+def _steps(loss: Array) -> list[int]:
+    """Records at which a loss goes from one steady value to another; that of a stuck rotor is never steady."""
+    change = np.abs(np.diff(loss))
+    found = np.flatnonzero(change > JUMP)
+    return [
+        int(at) + 1
+        for at in found
+        if (change[max(at - STEADY, 0) : at] < 1e-9).all() and (change[at + 1 : at + 1 + STEADY] < 1e-9).all()
+    ]
+
+
+def faults_of(data: FlightData, rotor: int) -> list[dict[str, Any]]:
+    """The faults of a rotor as the scenario has them: the settings of each; none where the records do not tell.
+
+    Parameters
+    ----------
+    data : FlightData
+    rotor : int
+        Its number, from 1.
+    """
     try:
         faults = json.loads(data.attrs.get("configuration", "{}")).get("fault", [])
-        return [str(fault["kind"]) for fault in faults if fault.get("rotor") == rotor and fault["kind"] != "step"]
-    except (ValueError, AttributeError, KeyError, TypeError):
+        return [fault for fault in faults if fault.get("rotor") == rotor]
+    except (ValueError, AttributeError, TypeError):
         return []
 
 
-def _fault_text(rotor: int, kinds: str, loss: float | None) -> str:
-    """A plain loss says how much; of other faults the kind tells more, and a loss may not be known."""
-    share = "" if loss is None else f" {100.0 * loss:.3g} % of its thrust"
-    if not kinds:
-        return f"rotor {rotor} loses{share or ' thrust'}"
-    return f"fault of rotor {rotor} begins ({kinds})" + (f", in the end{share} lost" if share else "")
+def _fault_text(rotor: int, faults: list[dict[str, Any]], loss: float | None) -> str:
+    """A plain loss says how much; of other faults the kind and its settings tell more."""
+    share = " thrust" if loss is None else f" {100.0 * loss:.3g} % of its thrust"
+    if all(fault.get("kind") == "step" for fault in faults):
+        return f"rotor {rotor} loses{share}"
+    return f"fault of rotor {rotor} begins: " + "; ".join(map(_settings_text, faults))
+
+
+def _settings_text(fault: Mapping[str, Any]) -> str:
+    numbers = [
+        f"{name} {value:.4g}"
+        for name, value in fault.items()
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and name not in WHEN
+    ]
+    return one_line(" ".join([str(fault.get("kind", "")), ", ".join(numbers)]).strip())
 
 
 def _alarms(data: FlightData, time: Array, scores: Mapping[str, Any]) -> Iterator[Event]:
@@ -191,9 +224,9 @@ def _saturation(data: FlightData, time: Array) -> Iterator[Event]:
     for k in range(command.shape[1]):
         for side, limit, sign in ends:
             spans = _spans(time, sign * (command[:, k] - limit) >= -AT_LIMIT)
-            for (start, end), more in _first(spans):
-                text = f"rotor {k + 1} at its {side} limit for {_span_text(end - start)}{more}"
-                yield Event(start, "saturation", text, k + 1, end)
+            for span, more in _first(spans):
+                text = f"rotor {k + 1} at its {side} limit {_span_text(span)}{more}"
+                yield Event(span.start, "saturation", text, k + 1, span.end)
 
 
 def _given_up(data: FlightData, time: Array) -> Iterator[Event]:
@@ -202,27 +235,29 @@ def _given_up(data: FlightData, time: Array) -> Iterator[Event]:
         return
     cut = np.asarray(data["given_up"].values) > 0.5
     for k, what in enumerate(("tilt", "thrust", "yaw")):
-        for (start, end), more in _first(_spans(time, cut[:, k])):
-            text = f"{what} {'cut' if what == 'thrust' else 'torque cut'} for {_span_text(end - start)}{more}"
-            yield Event(start, "given_up", text, 0, end)
+        for span, more in _first(_spans(time, cut[:, k])):
+            text = f"{what} {'cut' if what == 'thrust' else 'torque cut'} {_span_text(span)}{more}"
+            yield Event(span.start, "given_up", text, 0, span.end)
 
 
-def _span_text(seconds: float) -> str:
-    return f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+def _span_text(span: Span) -> str:
+    seconds = span.end - span.start
+    length = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+    return f"on and off for {length}" if span.broken else f"for {length}"
 
 
-def _spans(time: Array, where: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Times from and until which something holds, short breaks left out."""
+def _spans(time: Array, where: NDArray[np.bool_]) -> list[Span]:
+    """Times from and until which something holds, with short breaks."""
     edges = np.diff(where.astype(int), prepend=0, append=0)
     starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
     step = float(time[1] - time[0]) if len(time) > 1 else 0.0
-    spans: list[tuple[float, float]] = []
+    spans: list[Span] = []
     for start, stop in zip(starts, stops, strict=True):
         begin, end = float(time[start]), float(time[stop - 1]) + step
-        if spans and begin - spans[-1][1] < MERGE:
-            spans[-1] = spans[-1][0], end
+        if spans and begin - spans[-1].end < MERGE:
+            spans[-1] = Span(spans[-1].start, end, True)
         else:
-            spans.append((begin, end))
+            spans.append(Span(begin, end, False))
     return spans
 
 

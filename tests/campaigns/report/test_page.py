@@ -67,7 +67,7 @@ def test_page_has_the_numbers_and_commands_of_every_cell(page: str, plane: Maps)
         heat = spec["data"][0]
         np.testing.assert_allclose(np.array(heat["z"], dtype=float), variant.success_rate.T, atol=1e-5)
         for (i, j), successes in np.ndenumerate(variant.successes):
-            where, said, (command,), _, _ = heat["customdata"][j][i]
+            where, said, (command,), _, _, _ = heat["customdata"][j][i]
             assert where == f"loss {LOSS['values'][i]:g}, wind speed {WIND['values'][j]:g} m/s"
             assert f"success {successes} of {FIRST}" in said
             failure = f"--flight {variant.first_failure[i, j]}"

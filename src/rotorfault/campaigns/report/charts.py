@@ -29,6 +29,7 @@ from rotorfault.campaigns.report.axis_drawing import (
 )
 from rotorfault.campaigns.report.curves import LEVELS, Crossings, Slice, crossings, edges
 from rotorfault.campaigns.report.flown import command, place_text, variant_option
+from rotorfault.campaigns.report.kept import example, link
 from rotorfault.campaigns.report.limits import Limits
 from rotorfault.campaigns.report.maps import Maps, Pairing, VariantMap, View
 from rotorfault.campaigns.sampling.statistics import Array
@@ -49,11 +50,12 @@ class CellNote(NamedTuple):
     lines: tuple[str, ...]
     commands: tuple[str, ...]
     about: str  # what the commands replay
+    page: str = ""  # address of the page of a flight of it, if one was kept
 
     def as_data(self) -> list[str | list[str]]:
         """As data of a point of a chart, which shows the first two as markup."""
         lines = "<br>".join(map(_as_text, self.lines))
-        return [_as_text(self.where), lines, list(self.commands), self.about, self.where]
+        return [_as_text(self.where), lines, list(self.commands), self.about, self.where, self.page]
 
 
 def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
@@ -61,7 +63,8 @@ def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
     variant = maps.variants[k]
     cells = np.empty(variant.cell.shape, dtype=object)
     for at in np.ndindex(*variant.cell.shape):
-        cells[at] = CellNote(place_text(maps, at), _numbers(variant, at), *_replay(variant, at, folder))
+        page = link(folder, example(maps.study, variant, at))
+        cells[at] = CellNote(place_text(maps, at), _numbers(variant, at), *_replay(variant, at, folder), page)
     return cells
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import as_text
+from rotorfault.base.plain_text import argument
 from rotorfault.campaigns.axes import axis
 from rotorfault.campaigns.report.maps import Maps, View
 from rotorfault.campaigns.study import Study
@@ -98,14 +99,7 @@ def command(folder: Path, options: str) -> str:
     options : str
         Which flight.
     """
-    return f"rotorfault replay {quoted(folder)} {options}"
-
-
-def quoted(path: Path) -> str:
-    """A path as an argument of a command."""
-    place = str(path)
-    # Else it would be read as an option.
-    return shlex.quote(f"./{place}" if place.startswith("-") else place)
+    return f"rotorfault replay {argument(folder)} {options}"
 
 
 def variant_option(label: str) -> str:
@@ -116,7 +110,7 @@ def variant_option(label: str) -> str:
 def _repeat(study: Study, folder: Path) -> str:
     code = " --allow-code" if study.allows_code and study.own_sources else ""
     again = folder.with_name(f"{folder.name}-again")
-    return f"rotorfault campaign {quoted(folder / 'study.json')} --out {quoted(again)}{code}"
+    return f"rotorfault campaign {argument(folder / 'study.json')} --out {argument(again)}{code}"
 
 
 def _example(maps: Maps, folder: Path) -> tuple[str, str]:

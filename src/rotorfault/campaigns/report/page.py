@@ -13,12 +13,13 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
+from rotorfault.base.plain_text import argument
 from rotorfault.campaigns import grades
 from rotorfault.campaigns.report import charts
 from rotorfault.campaigns.report.answer import answer
 from rotorfault.campaigns.report.axis_drawing import coarse
 from rotorfault.campaigns.report.curves import slices
-from rotorfault.campaigns.report.flown import flown, quoted
+from rotorfault.campaigns.report.flown import flown
 from rotorfault.campaigns.report.maps import Maps, VariantMap
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.loop.scores import RECOVERED
@@ -72,10 +73,11 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         sections=[{k: v for k, v in section.items() if k != "spec"} for section in sections],
         specs=script_data([section["spec"] for section in sections]),
         slices=slices(maps),
+        kept=sum(1 for notes in cells for note in notes.ravel().tolist() if note.page),
         error=f"{100.0 * (1.0 - maps.study.refine.level):.3g} %",
         rows=rows[:MOST_ROWS],
         cut=len(rows) - MOST_ROWS if len(rows) > MOST_ROWS else 0,
-        folder=quoted(folder),
+        folder=argument(folder),
         figures={name: base64.b64encode(path.read_bytes()).decode("ascii") for name, path in figures.items()},
         plotly=Markup(get_plotlyjs()),
     )  # fmt: skip
