@@ -11,6 +11,9 @@ from __future__ import annotations
 import argparse
 import io
 import math
+import shutil
+import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -279,13 +282,32 @@ def _frame(data, time: float) -> Image.Image:  # type: ignore[no-untyped-def]
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
 
 
+def flight_page() -> bytes:
+    """The page of the paper's first case, in a browser."""
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
+        page = Path(rf.view([rf.fly(CASE)], out=Path(folder) / "flight.html"))
+        options = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        options += ["--no-sandbox"] if sys.platform == "linux" else []
+        browser = tools.chromium.launch(executable_path=shutil.which("chromium"), args=options)
+        shown = browser.new_page(viewport={"width": 1200, "height": 900})
+        shown.goto(page.as_uri())
+        shown.wait_for_timeout(2500)
+        drawn = Image.open(io.BytesIO(shown.screenshot())).convert("RGB").resize((900, 675))
+        browser.close()
+    out = io.BytesIO()
+    drawn.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    return out.getvalue()
+
+
 PICTURES: dict[str, Callable[[], Figure | bytes]] = {
     "motors-built-in.png": motors_built_in,
     "motors-autopilots.png": motors_autopilots,
     "data-flow.png": data_flow,
     "gallery-rotors.png": plotted("rotors", CASE),
     "gallery-detection.png": plotted("fault_detection", "hover-fault"),
-    "gallery-landing.png": plotted("position", "land-after-fault"),
+    "gallery-page.png": flight_page,
     "gallery-compare.png": compared,
     "gallery-attainable.png": attainable,
     "gallery-delay.png": delays,
