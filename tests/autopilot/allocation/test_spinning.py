@@ -1,4 +1,4 @@
-"""In a body that spins, the tilt torque of an arm with a faulty rotor yields to thrust and yaw where it falls short."""
+"""In a body that spins, tilt torque of an arm with a faulty rotor yields to thrust and yaw where it falls short."""
 
 from __future__ import annotations
 

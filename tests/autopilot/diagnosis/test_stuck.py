@@ -35,7 +35,7 @@ def watch(
 ) -> list[Stuck]:
     """Rotor 2 gives a thrust of the thrust asked for, as an observer with two poles shows it.
 
-    `yaw` is what the observer gets wrong about the yaw axis, in N of each rotor: of 1 and 2 alike, which are partners.
+    `yaw` is what the observer gets wrong about the yaw axis, in N of each rotor: of the partners 1 and 2 alike.
     """
     memory, told = nobody_judged(), []
     first = shown = gives(asked(0.0)) - asked(0.0)
