@@ -66,6 +66,7 @@ LAZY = {
     },
     "rotorfault.flight.flight": {
         "rotorfault.report.figures": MATPLOTLIB,
+        "rotorfault.report.film": MATPLOTLIB,
         "rotorfault.results.dataset": XARRAY,
         "rotorfault.pages.flight_page": PAGES,
     },

@@ -235,13 +235,14 @@ def test_ulog_has_the_events_as_messages(flight: rf.Flight, ulog: Any) -> None:
     assert not ulog.file_corruption
 
 
-def test_ulog_of_a_plus_frame_keeps_its_own_order(tmp_path: Path) -> None:
+def test_ulog_of_a_plus_frame_has_px4s_order_for_it(tmp_path: Path) -> None:
     pyulog = pytest.importorskip("pyulog", reason="needs pyulog")
     flown = rf.fly("paper-set-point", settings={"duration": 0.05})
     log = pyulog.ULog(str(flown.export(tmp_path / "a.ulg")))
-    assert "PX4 has no order" in log.msg_info_dict["rotorfault_motors"]
-    first = topic(log, "actuator_motors", "control[0]")[:, 0]
-    np.testing.assert_allclose(first, values_of(flown, "thrust_command")[:, 0] / 8.68, rtol=1e-6)
+    # PX4's quad +: right, left, front, rear; ours: front, rear, right, left.
+    assert "quadrotor +: motors 1 to 4 are rotors 3, 4, 1, 2" in log.msg_info_dict["rotorfault_motors"]
+    motors = topic(log, "actuator_motors", *(f"control[{k}]" for k in range(4)))
+    np.testing.assert_allclose(motors, values_of(flown, "thrust_command")[:, [2, 3, 0, 1]] / 8.68, rtol=1e-6)
 
 
 READERS: dict[str, Callable[[Path], int]] = {

@@ -1,4 +1,4 @@
-"""The command `rotorfault export`."""
+"""The commands `rotorfault export` and `rotorfault animate`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rotorfault.base.errors import InputError
 from rotorfault.cli.app import app, say
 
 
@@ -36,7 +37,6 @@ def export(
 
     Example: rotorfault export results/calm/flight.nc --to mcap
     """
-    from rotorfault.base.errors import InputError
     from rotorfault.flight.flight import load
     from rotorfault.results import exporters
 
@@ -46,3 +46,31 @@ def export(
     exporters.writer_of(form)
     written = exporters.write(load(flight).records(), exporters.target_of(form, flight, out), form, every, units)
     say("\n".join(f"wrote {path}" for path in written))
+
+
+@app.command()
+def animate(
+    flight: Annotated[Path, typer.Argument(metavar="FLIGHT.nc", help="A flight file that 'rotorfault fly' wrote.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help="Film to write, .gif or .mp4; a .gif beside the flight if not given."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(metavar="X", help="Of the flight; 1 is real time.")] = 1.0,
+    fps: Annotated[float, typer.Option(metavar="N", help="Pictures a second; up to 50 in a GIF.")] = 30.0,
+    width: Annotated[int, typer.Option(metavar="PIXELS", help="Of a picture; its height is 9/16 of it.")] = 960,
+    start: Annotated[float | None, typer.Option("--from", metavar="T", help="Begin here, s.")] = None,
+    until: Annotated[float | None, typer.Option(metavar="T", help="End here, s.")] = None,
+) -> None:
+    """Write a flight as a film: the scene, the vehicle close up, thrusts and losses, what happens in words.
+
+    Example: rotorfault animate results/calm/flight.nc -o calm.mp4 --speed 0.5 --until 4
+    """
+    from rotorfault.flight.flight import load
+
+    target = out or flight.with_suffix(".gif")
+    if target.is_dir():
+        raise InputError(f"{target}: is a folder; give a file with --out, such as {target / 'flight.gif'}")
+    written = load(flight).animate(target, speed=speed, fps=fps, width=width, start=start, until=until)
+    say(f"wrote {written}")

@@ -149,6 +149,49 @@ class Flight:
 
         return Shown(label, self.records(), rows(self.summary()), self.source)
 
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        speed: float = 1.0,
+        fps: float = 30.0,
+        width: int = 960,
+        start: float | None = None,
+        until: float | None = None,
+    ) -> Path:
+        """Write the flight as a film: scene, vehicle close up, thrusts and losses, what happens in words.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ends in ``.gif`` or ``.mp4``.
+        speed : float
+            Of the flight, 1 for real time.
+        fps : float
+            Pictures a second: up to 50 in a GIF, up to 120 in a video.
+        width : int
+            Of a picture in pixels, 320 to 3840; its height is 9/16 of it.
+        start, until : float, optional
+            Times of the flight in s; all of it if not given.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If a value is not allowed, nothing was recorded in that time, or the folder does not exist.
+        MissingExtraError
+            If a video is wanted and imageio-ffmpeg is not installed.
+        """
+        from rotorfault.report.film import Film, write_film
+
+        name = f"{self.scenario_name} · {self.label}"
+        write_film(self.records(), name, Path(path), Film(speed, fps, width, start, until))
+        return Path(path)
+
     def to_csv(self, path: str | Path, every: int = 1, units: bool = True) -> Path:
         """Write all signals as one table, a row per record and a column per component.
 

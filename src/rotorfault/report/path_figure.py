@@ -109,7 +109,7 @@ def _box(drawn: Sequence[Drawn]) -> tuple[Array, Array]:
     return low - spare, high + spare
 
 
-def _once(path: Array) -> Array:
+def once(path: Array) -> Array:
     """A path with gaps (NaN) where it has been before: dashes drawn twice would fill each other's gaps."""
     cell = SAME_PLACE * float(np.ptp(path, axis=0).max())
     _, first, cells = np.unique(np.floor(path / cell), axis=0, return_index=True, return_inverse=True)
@@ -125,7 +125,7 @@ def _targets(axes: Any, drawn: Sequence[Drawn]) -> list[Any]:
     for flight in drawn:
         path = flight.values("position_reference")
         if np.ptp(path, axis=0).max() > 1e-9:
-            path = _once(path)
+            path = once(path)
             kept = np.unique(np.concatenate([extremes(path[:, k]) for k in range(3)]))
             axes.plot(*path[kept].T, **REFERENCE, zorder=5)
             name, style = "reference", REFERENCE

@@ -21,11 +21,11 @@ from rotorfault._version import __version__
 from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
-from rotorfault.model.conventions import convert, layout
+from rotorfault.model.conventions import convert
+from rotorfault.results.airframe import airframe_of, px4_order
 from rotorfault.results.events import events
 from rotorfault.results.exporters.wanted import Names, Wanted, signals
 from rotorfault.results.flight_data import FlightData
-from rotorfault.results.flown import vehicle_file_of
 
 MAGIC = b"ULog\x01\x12\x35\x01"
 MOST_MOTORS = 12  # of PX4's actuator_motors
@@ -134,17 +134,14 @@ def _rows(time: Array, topics: list[Topic]) -> NDArray[np.void]:
 def _motors(data: FlightData) -> tuple[list[int], str]:
     """Which rotor is each motor, as indices, and what is said of it."""
     count = data["thrust_command"].values.shape[1] if "thrust_command" in data else 0
-    own = list(range(count))
-    file = vehicle_file_of(data)
-    if file is not None and count == len(own):
-        try:
-            ours, theirs = layout(file.vehicle).corners, layout("px4").corners
-        except InputError:
-            return own, "motor n is rotor n of the vehicle file; PX4 has no order for this layout"
-        order = [ours.index(corner) for corner in theirs]
-        numbers = ", ".join(str(k + 1) for k in order)
-        return order, f"PX4's order for quad X: motors 1 to {count} are rotors {numbers} of the vehicle file"
-    return own, "motor n is rotor n of the vehicle file"
+    airframe = airframe_of(data)
+    if airframe.count != count or not count:
+        return list(range(count)), "motor n is rotor n of the vehicle file"
+    order, name = px4_order(airframe)
+    if not name:
+        return order.tolist(), "motor n is rotor n of the vehicle file; PX4 has no order for this layout"
+    numbers = ", ".join(str(k + 1) for k in order)
+    return order.tolist(), f"PX4's order for {name}: motors 1 to {count} are rotors {numbers} of the vehicle file"
 
 
 def _px4(data: FlightData, motors: list[int]) -> list[Topic]:
