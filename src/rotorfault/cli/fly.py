@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from rotorfault.cli.app import AllowCode, Assignments, app, finish, say
 
 if TYPE_CHECKING:
     from rotorfault.flight.flight import Flight
+    from rotorfault.flight.following import Follow
     from rotorfault.scenario.scenario import Scenario
 
 
@@ -39,6 +41,11 @@ def fly(
         Path | None, typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Write the flight's page as well: flight.html.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Show the flight in the terminal while it is flown.")] = False,
+    live_speed: Annotated[
+        float | None,
+        typer.Option("--live-speed", metavar="X", help="Speed of --live; 1 (real time) if not given."),
+    ] = None,
     allow_code: AllowCode = False,
 ) -> None:
     """Fly a scenario: print what happened, write flight.nc, summary.json and figures.
@@ -52,11 +59,14 @@ def fly(
     from rotorfault.flight.fly import repeat as fly_again
     from rotorfault.scenario.overrides import parse_overrides
 
+    watched = _watched(live, live_speed)
     if repeat is not None:
         if any(value is not None for value in (scenario, controller, preset, assignments, seed)):
             raise InputError("--repeat takes scenario, controller and settings from the file; give it alone")
         folder = output_folder(out or Path("results") / "repeat")
-        finish(fly_again(repeat, engine, allow_code=allow_code), folder, figures, view)
+        with watched as follow:
+            again = fly_again(repeat, engine, allow_code=allow_code, follow=follow)
+        finish(again, folder, figures, view)
         return
     if scenario is None:
         raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
@@ -67,7 +77,20 @@ def fly(
     # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
     folder = out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")
     output_folder(folder)
-    finish(_flown(checked, engine), folder, figures, view)
+    with watched as follow:
+        flight = _flown(checked, engine, follow)
+    finish(flight, folder, figures, view)
+
+
+def _watched(live: bool, speed: float | None) -> AbstractContextManager[Follow | None]:
+    """What looks at a flight while it is computed; nothing if nobody wants to."""
+    if not live:
+        if speed is not None:
+            raise InputError("--live-speed is the speed of --live; give both")
+        return nullcontext()
+    from rotorfault.cli.live import View, checked_speed, screen
+
+    return View(screen(), checked_speed(1.0 if speed is None else speed))
 
 
 def _name(scenario: Scenario) -> str:
@@ -77,14 +100,14 @@ def _name(scenario: Scenario) -> str:
     return scenario[CONTROLLER].kind.rpartition(":")[2]
 
 
-def _flown(scenario: Scenario, engine: str | None) -> Flight:
+def _flown(scenario: Scenario, engine: str | None, follow: Follow | None) -> Flight:
     """Fly; whatever goes wrong in code of the user's own is told in one line."""
     from rotorfault.base.foreign import in_one_line
     from rotorfault.flight.fly import fly as fly_scenario
 
     own = [part for _, part in scenario.parts() if part.source]
     try:
-        return fly_scenario(scenario, engine=engine)
+        return fly_scenario(scenario, engine=engine, follow=follow)
     except InputError:
         raise
     except Exception as error:

@@ -14,6 +14,9 @@ from rotorfault.loop.closed_loop import ClosedLoop, Drive, LoopParameters, LoopS
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, leaf_names
 
+Look = Callable[[int, Array], None]
+"""Is shown records as they are made: number of the first one's step, and signals, shape (records, rows, flights)."""
+
 CHUNK = 500  # steps between two looks at progress, noise and flights that are over
 
 
@@ -28,6 +31,7 @@ class Batch(NamedTuple):
     seeds: tuple[tuple[int, int], ...]  # (seed, flight index) per flight: names its random numbers
     every: int = 1  # record each so many steps; 0 records nothing
     wanted: tuple[int, ...] | None = None  # rows of the loop's layout that are recorded; None for all
+    look: Look | None = None  # of a single flight: sees its records before an engine's `Watch` is next called
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -150,7 +154,7 @@ class Records:
     """
 
     def __init__(self, batch: Batch) -> None:
-        self.every = batch.every
+        self.every, self._look = batch.every, batch.look
         self._ends = ends_of(batch)
         self._rows = None if batch.wanted is None else list(batch.wanted)
         capacity = 0 if batch.every == 0 else -(-batch.steps // batch.every)
@@ -175,6 +179,8 @@ class Records:
         chosen = signals if self._rows is None else signals[:, self._rows]
         self._signals[first : first + len(signals), :, flights] = chosen
         self._filled = max(self._filled, first + len(signals))
+        if self._look is not None:
+            self._look(step, chosen)
 
     def until(self, step: int) -> None:
         """Forget records from a step on: some of the flights have not got there."""

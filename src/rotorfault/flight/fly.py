@@ -25,6 +25,7 @@ from rotorfault.engine.batch import Batch, Recording
 from rotorfault.flight import doubts
 from rotorfault.flight.assembly import Own, assemble, assemble_all
 from rotorfault.flight.flight import Flight
+from rotorfault.flight.following import Follow, Following
 from rotorfault.loop.scores import ENDS
 from rotorfault.maths.records import unflatten
 from rotorfault.plant import PLANT
@@ -46,6 +47,7 @@ def fly(
     engine: str | None = None,
     seed: int | None = None,
     allow_code: bool = False,
+    follow: Follow | None = None,
 ) -> Flight:
     """Fly a scenario.
 
@@ -69,6 +71,9 @@ def fly(
         Names the random numbers of sensor noise and gusts.
     allow_code : bool
         Whether code that the scenario names may run; code that is named here may.
+    follow : callable, optional
+        Is called with the records, a piece at a time, while the flight is computed, and may take its time; see
+        `rotorfault.flight.following`.
 
     Returns
     -------
@@ -85,13 +90,15 @@ def fly(
         _require_no_settings(settings or {})
     checked = prepare(scenario, named, settings, seed, allow_code)
     doubts.warn(checked, own_controller=own is not None)
-    flight = fly_checked(checked, own, engine)
+    flight = fly_checked(checked, own, engine, follow)
     if doubt := doubts.rattling(flight.scores, flight.label):
         warnings.warn(doubt.says, doubt.kind, stacklevel=2)
     return flight
 
 
-def fly_checked(scenario: Scenario, controller: Any = None, engine: str | None = None) -> Flight:
+def fly_checked(
+    scenario: Scenario, controller: Any = None, engine: str | None = None, follow: Follow | None = None
+) -> Flight:
     """Fly a checked scenario without a word about what is hardly meant, for studies of what is odd on purpose.
 
     Parameters
@@ -100,6 +107,8 @@ def fly_checked(scenario: Scenario, controller: Any = None, engine: str | None =
     controller : object, optional
         Flies in place of the scenario's; as for `fly`.
     engine : str, optional
+        As for `fly`.
+    follow : callable, optional
         As for `fly`.
 
     Raises
@@ -115,7 +124,14 @@ def fly_checked(scenario: Scenario, controller: Any = None, engine: str | None =
         raise InputError(
             f"engine '{name}' cannot run a controller that is a plain Python object; use engine 'python'"
         )
-    return _flight(scenario, _run(batch, name, scenario.period), batch, 0, name, controller)
+    following = None
+    if follow is not None:
+        about = _attributes(scenario, name, controller) | {"duration": scenario.duration}
+        following = Following(follow, batch.loop.layout, scenario.period * batch.every, about)
+    flight = _flight(scenario, _run(batch, name, scenario.period, following), batch, 0, name, controller)
+    if following is not None:
+        following.end(len(flight.records()["time"].values))
+    return flight
 
 
 def _require_no_settings(settings: Mapping[str, Any]) -> None:
@@ -182,7 +198,9 @@ def prepare(
     return scenario_from(tables, as_text(tables.get("name", "scenario")), allowed)
 
 
-def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = False) -> Flight:
+def repeat(
+    path: str | Path, engine: str | None = None, *, allow_code: bool = False, follow: Follow | None = None
+) -> Flight:
     """Fly again what a flight file holds.
 
     Parameters
@@ -193,6 +211,8 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
         That of the file if not given.
     allow_code : bool
         Whether code that the file names may run.
+    follow : callable, optional
+        As for `fly`.
 
     Raises
     ------
@@ -211,7 +231,7 @@ def repeat(path: str | Path, engine: str | None = None, *, allow_code: bool = Fa
         _without_presets(tables)
     _without_reaction(tables)
     scenario = scenario_from(tables, str(path), allow_code)
-    return fly(scenario, engine=str(attributes["engine"]) if engine is None else engine)
+    return fly(scenario, engine=str(attributes["engine"]) if engine is None else engine, follow=follow)
 
 
 def _without_presets(tables: dict[str, Any]) -> None:
@@ -230,7 +250,9 @@ def _without_reaction(tables: dict[str, Any]) -> None:
         vehicle.setdefault("rotor_reaction", none)
 
 
-def _run(batch: Batch, engine: str, period: float) -> Recording:
+def _run(batch: Batch, engine: str, period: float, following: Following | None = None) -> Recording:
+    if following is not None:
+        return load_engine(engine)(batch._replace(look=following.look), following.watch)
     with Bar("flying", batch.steps * period, "s") as bar:
 
         def watch(done: int) -> bool:
