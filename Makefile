@@ -15,8 +15,8 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper ranges test test-numpy test-bounds web fuzz lint types bench peers maps benchmarks clean \
-  check-python
+.PHONY: help venv paper ranges test test-numpy test-bounds web fuzz lint types bench peers maps benchmarks docs \
+  docs-long clean check-python
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "%-14s%s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -101,6 +101,16 @@ bench: .venv/.stamp-bench ## Measure speed and accuracy on this machine
 
 peers: .venv/.stamp-bench ## The same beside crazyflow, RotorPy and l2f (installs 8 GB on first use)
 	.venv/$(BIN)/rotorfault bench --peers --json results/bench.json --figure results/error-cost.png
+
+.venv/.stamp-docs: .venv/.stamp-develop
+	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
+	@touch $@
+
+docs: .venv/.stamp-docs ## Build the site of the documentation in results/site; it runs the notebooks (1 min)
+	.venv/$(BIN)/python tools/docs_site/build.py
+
+docs-long: .venv/.stamp-develop ## Run the code of all pages as it stands, with what takes long (an hour on 2 cores)
+	ROTORFAULT_LONG_PAGES=1 .venv/$(BIN)/python -m pytest tests/project/test_pages.py
 
 maps: .venv/.stamp-fly ## Fly the built-in survival campaigns
 	for study in partial-loss-map two-rotors detection-worth mass-inertia; do \

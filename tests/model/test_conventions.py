@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-
 import numpy as np
 import pytest
 from places import EXAMPLES
@@ -11,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import rotorfault as rf
 from rotorfault.maths.rotation import Quat
-from rotorfault.model import conventions
 from rotorfault.model.conventions import CORNERS, KINDS, ORDERS, layout
 
 # The axes of NED and FRD in ours, by their meaning and not by a sign: north is x, east is right of it, down is down.
@@ -149,9 +146,3 @@ def test_corners_of_a_vehicle_follow_from_its_torques() -> None:
 def test_what_cannot_be_converted_is_refused(arguments: tuple[object, ...], message: str) -> None:
     with pytest.raises(rf.InputError, match=message):
         rf.convert(*arguments)  # type: ignore[arg-type]
-
-
-def test_the_examples_of_the_docstring_are_right() -> None:
-    found = doctest.testmod(conventions)
-    assert found.attempted >= 3
-    assert not found.failed

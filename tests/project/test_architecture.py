@@ -73,19 +73,10 @@ LAZY = {
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
-    "rotorfault.results.exporters.doubles": {"google.protobuf.descriptor_pb2": OPTIONAL},
-    "rotorfault.results.exporters.foxglove_scene": {"foxglove.messages": OPTIONAL},
-    "rotorfault.results.exporters.mat_file": {"scipy.io": "takes longer to load than a flight to fly"},
-    "rotorfault.results.exporters.mcap_file": {
-        "foxglove": OPTIONAL,
-        "foxglove.channels": OPTIONAL,
-        "foxglove.messages": OPTIONAL,
-    },
-    "rotorfault.results.exporters.parquet_file": {
-        "pyarrow": "takes longer to load than a flight to fly",
-        "pyarrow.parquet": "the same",
-    },
-    "rotorfault.results.exporters.rrd_file": {"rerun": OPTIONAL, "rerun.blueprint": OPTIONAL},
+    "rotorfault.results.exporters.mat": {"scipy.io": "takes longer to load than a flight to fly"},
+    "rotorfault.results.exporters.mcap": {"mcap.writer": OPTIONAL},
+    "rotorfault.results.exporters.parquet": {"pyarrow": "the same as scipy", "pyarrow.parquet": "the same"},
+    "rotorfault.results.exporters.rrd": {"rerun": OPTIONAL, "rerun.blueprint": OPTIONAL},
     "rotorfault.tuning.search": {"cma": OPTIONAL},
 }
 # Modules that load others by names that are data: only there may `import_module` stand, which hides from readers,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -109,29 +108,10 @@ def test_the_command_writes_what_python_writes(flights: list[rf.Flight], tmp_pat
     assert (tmp_path / "b.csv").read_text() == flights[1].to_csv(tmp_path / "c.csv", units=False).read_text()
 
 
-def test_the_command_takes_the_format_of_the_ending_and_writes_a_layout(
-    flights: list[rf.Flight], tmp_path: Path
-) -> None:
-    flights[0].save(tmp_path / "flight.nc")
-    done = run("export", "flight.nc", "--out", "b.ulg", "--every", "10", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (0, "wrote b.ulg\n")
-    assert (tmp_path / "b.ulg").read_bytes()[:4] == b"ULog"
-    done = run("export", "flight.nc", "--to", "mcap", "--every", "10", "--layout", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("wrote flight.mcap\nwrote flight.layout.json; in Foxglove: ")
-    assert "Plot!thrust" in json.loads((tmp_path / "flight.layout.json").read_text())["configById"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["flight.nc", "--to", "xls"], "--to: unknown format 'xls' (allowed: csv, parquet, mat, mcap, rrd, ulog)"),
-        (
-            ["flight.nc"],
-            "no format was given; give --to (allowed: csv, parquet, mat, mcap, rrd, ulog), or --out with",
-        ),
-        (["flight.nc", "--out", "a.doc"], "a.doc: its ending tells no format (allowed: .csv, .parquet, .mat, .mcap"),
-        (["flight.nc", "--to", "csv", "--layout"], "--layout is for the format mcap; got --to csv"),
         (["flight.nc", "--to", "csv", "--out", "."], ".: is a folder; give a file with --out, such as flight.csv"),
         (["flight.nc", "--to", "csv", "--out", "flight.nc"], "flight.nc: is the flight itself; give another file"),
         (["flight.nc", "--to", "csv", "--out", "no/where.csv"], "no/where.csv: there is no folder no; make it first"),

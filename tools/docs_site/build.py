@@ -65,17 +65,19 @@ def relinked(text: str, origin: Path, page: str) -> str:
 def cards(match: re.Match[str]) -> str:
     """A gallery, which is a table on a forge, as a grid of cards."""
     rows = [line.strip().strip("|") for line in match[1].splitlines() if line.startswith("| [")]
-    lines = ["::::{grid} 1 2 2 3", ":gutter: 3", ":class-container: gallery", ""]
+    lines = [":::::{grid} 1 2 2 2", ":gutter: 3", ":class-container: gallery", ""]
     for cell in (cell.strip() for row in rows for cell in row.split(" | ")):
         found = re.fullmatch(r"\[!\[([^]]*)\]\(([^)]+)\)\]\(([^)]+)\)<br>\*\*(.+?)\*\*<br>(.+)<br>`([^`]+)`", cell)
         if not found:
             raise SystemExit(f"the gallery has a cell that is none of its kind: {cell}")
         alt, image, page, title, text, command = found.groups()
+        target, _, anchor = page.partition("#")
+        url = target.rpartition(".")[0] + ".html" + (f"#{anchor}" if anchor else "")
         lines += [
-            f":::{{grid-item-card}} {title}", f":img-top: {image}", f":img-alt: {alt}",
-            f":link: {page.removesuffix('.md')}", ":link-type: doc", "", text, "+++", f"`{command}`", ":::", "",
+            f"::::{{grid-item-card}} {title}", f":img-top: {image}", f":img-alt: {alt}", f":link: {url}",
+            ":link-type: url", "", text, "", ":::{card-footer}", f"`{command}`", ":::", "::::", "",
         ]  # fmt: skip
-    return "\n".join([*lines, "::::", ""])
+    return "\n".join([*lines, ":::::", ""])
 
 
 def contents(page: str, below: list[str]) -> str:
@@ -144,7 +146,11 @@ def main() -> int:
     command = [sys.executable, "-m", "sphinx", "-b", "html", "-c", str(HERE), "-d", str(SOURCE.parent / "doctrees")]
     # Afresh each time: an old tree of pages would hide warnings.
     command += ["-E", "-W", "--keep-going", "-q", str(SOURCE), str(SITE)]
-    environment = os.environ | {"PYDEVD_DISABLE_FILE_VALIDATION": "1", "MPLBACKEND": "agg"}
+    # Kernels of notebooks are to say what goes wrong, and nothing else.
+    profile = SOURCE.parent / "ipython" / "profile_default"
+    profile.mkdir(parents=True, exist_ok=True)
+    (profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n", encoding="utf-8")
+    environment = os.environ | {"IPYTHONDIR": str(profile.parent), "PYDEVD_DISABLE_FILE_VALIDATION": "1"}
     code = subprocess.run(command, check=False, env=environment).returncode
     if code:
         return code

@@ -19,11 +19,11 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_design",  # the grid of the gallery
-    "mathml",  # formulas without a script: tools/docs_site/mathml.py
+    "formulas",  # drawn into the page: tools/docs_site/formulas.py
     "public_names",  # docstrings of what the package exports: tools/docs_site/public_names.py
 ]
 exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
-templates_path: list[str] = []
+smartquotes = False  # options begin with two hyphens
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
 # Markdown as on a forge: anchors of headings, $formulas$.
@@ -45,6 +45,7 @@ napoleon_numpy_docstring = True
 napoleon_use_rtype = False
 toc_object_entries_show_parents = "hide"
 
+html_math_renderer = "drawings"
 html_theme = "pydata_sphinx_theme"
 html_title = "rotorfault"
 html_static_path = ["static"]
@@ -68,4 +69,4 @@ html_theme_options = {
     "article_header_start": ["breadcrumbs"],
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = {"index": [], "**": ["sidebar-nav-bs"]}
+html_sidebars = {name: [] for name in ("index", "conventions", "survival", "paper")} | {"**": ["sidebar-nav-bs"]}

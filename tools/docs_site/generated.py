@@ -9,6 +9,7 @@ from structure import API
 
 import rotorfault
 from rotorfault.cli.main import app
+from rotorfault.model.block import Block
 
 
 def commands_page() -> str:
@@ -76,23 +77,26 @@ def _cell(text: str) -> str:
 def api_pages() -> dict[str, str]:
     """The pages of the public names, and the page that lists them."""
     listed = [name for _, _, names in API.values() for name in names]
-    wrong = sorted(set(listed) ^ (set(rotorfault.__all__) - {"__version__"}))
-    if wrong or len(set(listed)) != len(listed):
-        raise SystemExit(
-            f"tools/docs_site/structure.py: API and rotorfault.__all__ differ in {wrong}, or a name is twice"
-        )
+    public = set(rotorfault.__all__) - {"__version__"}
+    if not public >= set(listed) or len(set(listed)) != len(listed):
+        raise SystemExit(f"tools/docs_site/structure.py: API has {sorted(set(listed) - public)}, or a name twice")
+    groups = API | {"more": ("More", "What stands nowhere else.", sorted(public - set(listed)))}
     index = ["# Python", "", "What `import rotorfault as rf` gives; all of it, and nothing else, is public.", ""]
     pages = {}
-    for page, (title, says, names) in API.items():
+    for page, (title, says, names) in groups.items():
+        if not names:
+            continue
         index += [f"## {title}", "", f"{says} [In full]({page}.md).", "", "| name | |", "| --- | --- |"]
         lines = [f"# {title}", "", says, ""]
         for name in names:
-            index.append(f"| [`{name}`]({page}.md#rotorfault.{name}) | {_cell(_summary(name))} |")
+            index.append(f"| {{py:obj}}`{name} <rotorfault.{name}>` | {_cell(_summary(name))} |")
             thing = getattr(rotorfault, name)
             kind = "autofunction"
             if isinstance(thing, type):
                 kind = "autoexception" if issubclass(thing, Exception) else "autoclass"
-            members = ["   :members:"] if kind == "autoclass" and name not in ("Settings",) else []
+            members = ["   :members:", "   :exclude-members: model_config"] if kind == "autoclass" else []
+            if kind == "autoclass" and issubclass(thing, Block):
+                members.append("   :inherited-members: Generic")  # what a part of one's own has to write
             lines += ["```{eval-rst}", f".. {kind}:: rotorfault.{name}", *members, "```", ""]
         index.append("")
         pages[f"reference/api/{page}.md"] = "\n".join(lines)

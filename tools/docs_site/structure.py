@@ -16,9 +16,24 @@ CHILDREN: dict[str, list[str]] = {
         "tutorials/own-parts",
         "tutorials/survival-map",
         "tutorials/*",
+        "notebooks/first-flight",
+        "notebooks/detection-delay",
+        "notebooks/gain-sweep",
         "notebooks/*",
     ],
-    "recipes/index": ["recipes/*"],
+    "recipes/index": [
+        "recipes/fail-a-motor",
+        "recipes/add-wind",
+        "recipes/which-motor-is-1",
+        "recipes/own-vehicle",
+        "recipes/change-a-gain",
+        "recipes/compare-controllers",
+        "recipes/own-detector",
+        "recipes/survivable",
+        "recipes/read-a-flight-file",
+        "recipes/repeat",
+        "recipes/*",
+    ],
     "explanations/index": [
         "explanations/truth-and-belief",
         "controllers/index",
@@ -48,7 +63,6 @@ CHILDREN: dict[str, list[str]] = {
         "contributing",
         "security",
     ],
-    "reference/api/index": ["reference/api/*"],
 }  # fmt: skip
 
 # Files of the repository that are pages of the site, by where they lie.
@@ -59,7 +73,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
     "fly": (
         "Fly",
         "Single flights, many at once, and what comes back.",
-        ["fly", "fly_all", "repeat", "load", "Flight", "fly_many", "Flights", "compare", "Comparison"],
+        ["fly", "fly_all", "repeat", "load", "Flight", "fly_many", "Flights", "compare", "Comparison", "view"],
     ),
     "campaigns": ("Campaigns", "Maps of thousands of flights.", ["campaign", "Campaign"]),
     "before": (
@@ -95,3 +109,5 @@ API: dict[str, tuple[str, str, list[str]]] = {
         ["InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "VehicleWarning"],
     ),
 }  # fmt: skip
+
+CHILDREN["reference/api/index"] = [*(f"reference/api/{page}" for page in API), "reference/api/*"]

@@ -14,7 +14,7 @@ from rotorfault.autopilot.allocation.accounting import account, direct
 from rotorfault.autopilot.control.protocol import ControlOutput
 from rotorfault.autopilot.diagnosis.protocol import Oracle
 from rotorfault.autopilot.instant import Decision, Instant, Past
-from rotorfault.autopilot.rotor_model import believed_residual_speed, follow, rotors_at_hover
+from rotorfault.autopilot.rotor_model import expected_thrust, follow, rotors_at_hover
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
@@ -22,7 +22,7 @@ from rotorfault.model.block import Block, Record
 from rotorfault.model.signals import Allocation, Command, Readings, Reference, Wrench, healthy, motion_of
 from rotorfault.model.slot import Slot
 from rotorfault.model.telemetry import example
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle, hover_thrust, rotor_speeds
 
 AnyBlock = Block[Any, Any, Any, Any]
 
@@ -85,7 +85,7 @@ class Autopilot:
         hover = hover_thrust(vehicle)
         held = hover / vehicle.rotor_gain
         rotors = rotors_at_hover(vehicle)
-        past = Past(rotors, (), Command(held, zeros()), 0.0, believed_residual_speed(rotors, vehicle))
+        past = Past(rotors, (), Command(held, zeros()), 0.0, rotor_speeds(vehicle, expected_thrust(rotors, vehicle)))
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
         wrench = Wrench(hover.sum(), zeros())
@@ -161,7 +161,7 @@ class Autopilot:
             previous=instant.expectation.now,
             command=command,
             elapsed=dt,
-            residual_speed=instant.expectation.residual_speed,
+            speed=instant.expectation.speed,
         )
         report = AutopilotReport(instant, wrench, allocation, telemetry)
         return AutopilotMemory(past, self._record(*memories)), command, report

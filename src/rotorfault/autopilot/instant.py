@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, cast, final
 
 from rotorfault.autopilot.prediction import Expectation, Prediction, predict
-from rotorfault.autopilot.rotor_model import RotorModel, believed_residual_speed, expected_thrust
+from rotorfault.autopilot.rotor_model import RotorModel, expected_thrust
 from rotorfault.base.errors import InputError
 from rotorfault.base.number_rule import short
 from rotorfault.base.one_line import record_line
@@ -27,7 +27,7 @@ from rotorfault.model.signals import (
     Wrench,
     motion_of,
 )
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
 
 DEMANDS = (
     "Wrench(thrust, Vec3(roll, pitch, yaw)) in N and N m, or PerRotor(r1, r2, r3, r4) of thrusts in N, which are "
@@ -43,7 +43,7 @@ class Past(NamedTuple):
     previous: Motion | tuple[()]  # estimated last; empty before the first instant
     command: Command  # sent last; hover before the first
     elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
-    residual_speed: Scalar  # rad/s: believed Omega of (4) at the last instant
+    speed: PerRotor  # rad/s: of sound rotors at the last instant
 
 
 class Decision(NamedTuple):
@@ -123,14 +123,15 @@ class Instant:
     def expectation(self) -> Expectation:
         """The last period as believed with sound rotors."""
         now, thrust = motion_of(self.estimate), expected_thrust(self.past.rotors, self.vehicle)
-        residual = believed_residual_speed(self.past.rotors, self.vehicle)
+        speed = rotor_speeds(self.vehicle, thrust)
         return Expectation(
             now=now,
             previous=now if self.past.previous == () else cast("Motion", self.past.previous),
             mean_thrust=self.past.rotors.mean,
             thrust=thrust,
-            residual_speed=residual,
-            residual_change=residual - self.past.residual_speed,
+            residual_speed=residual_speed(self.vehicle, speed),
+            speed=speed,
+            sped=speed - self.past.speed,
             direct_acceleration_W=self.past.command.direct_acceleration_W,
             elapsed=self.past.elapsed,
         )
@@ -138,4 +139,5 @@ class Instant:
     @cached_property
     def prediction(self) -> Prediction:
         """What the believed model explains of the last period, with the losses that are believed now."""
-        return predict(self.expectation, self.decision.diagnosis.loss, self.vehicle)
+        believed = self.decision.diagnosis
+        return predict(self.expectation, believed.loss, self.vehicle, believed.stuck)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import angular_acceleration, drag_acceleration
-from rotorfault.model.signals import Motion
-from rotorfault.model.vehicle import Vehicle, rate_against_rotors, wrench_of
+from rotorfault.model.signals import FOLLOWING, Motion, Stuck
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
 
 
 class Expectation(NamedTuple):
@@ -23,7 +23,8 @@ class Expectation(NamedTuple):
     mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the period
     thrust: PerRotor  # N: thrust of sound rotors now
     residual_speed: Scalar  # rad/s: believed Omega of (4)
-    residual_change: Scalar  # rad/s: by which it has changed over the period
+    speed: PerRotor  # rad/s: of sound rotors now
+    sped: PerRotor  # rad/s: by which that has changed over the period
     direct_acceleration_W: Vec3  # m/s^2: commanded over the period, zero without the option `six_inputs`
     elapsed: Scalar  # s: time since the last instant; 0 at the first, so that nothing is predicted there
 
@@ -35,7 +36,7 @@ class Prediction(NamedTuple):
     delta_omega_B: Vec3  # rad/s
 
 
-def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Prediction:
+def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: Stuck = FOLLOWING) -> Prediction:
     """Velocity changes that the believed rotors, their reaction, gravity, drag and gyroscopics explain.
 
     Parameters
@@ -46,9 +47,11 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Predi
         Believed loss of each rotor, 0 to 1.
     vehicle : Vehicle
         As believed.
+    stuck : Stuck
+        Rotors that are believed not to follow; their loss is not looked at.
     """
     e, before, now = expectation, expectation.previous, expectation.now
-    wrench = wrench_of(vehicle, e.mean_thrust * (1.0 - loss))
+    wrench = wrench_of(vehicle, stuck.thrust_of(e.mean_thrust, loss))
     axis_W = (before.axis_W + now.axis_W) * 0.5
     v_W = (before.v_W + now.v_W) * 0.5
     omega_B = (before.omega_B + now.omega_B) * 0.5
@@ -59,9 +62,20 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle) -> Predi
         + e.direct_acceleration_W
     )
     turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
-    return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle))
+    return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle, stuck.rotor))
 
 
-def reaction(expectation: Expectation, vehicle: Vehicle) -> Vec3:
-    """Change of the body rates in rad/s over the last period by the believed rotors' change of speed."""
-    return Vec3(0.0, 0.0, -rate_against_rotors(vehicle, expectation.residual_change))
+def reaction(expectation: Expectation, vehicle: Vehicle, stuck: PerRotor) -> Vec3:
+    """Change of the body rates in rad/s over the last period by the believed rotors' change of speed.
+
+    Parameters
+    ----------
+    expectation : Expectation
+        Of the last period.
+    vehicle : Vehicle
+        As believed.
+    stuck : PerRotor
+        1 for a rotor that is believed not to follow, nor to change its speed.
+    """
+    sped = expectation.sped * (1.0 - stuck)
+    return Vec3(0.0, 0.0, -rate_against_rotors(vehicle, residual_speed(vehicle, sped)))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import lag_held, limited
-from rotorfault.model.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, hover_thrust
 
 
 class RotorModel(NamedTuple):
@@ -31,11 +31,6 @@ def expected_thrust(model: RotorModel, vehicle: Vehicle) -> PerRotor:
     """Thrust of sound rotors now, in N."""
     thrust: PerRotor = model.lagged * vehicle.rotor_gain
     return thrust
-
-
-def believed_residual_speed(model: RotorModel, vehicle: Vehicle) -> Scalar:
-    """Omega of (4) with sound rotors now, in rad/s."""
-    return residual_speed(vehicle, rotor_speeds(vehicle, expected_thrust(model, vehicle)))
 
 
 def follow(model: RotorModel, command: PerRotor, vehicle: Vehicle, dt: Scalar) -> RotorModel:

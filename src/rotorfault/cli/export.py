@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorfault.base.errors import InputError, choices
+from rotorfault.base.errors import InputError
 from rotorfault.cli.app import app, say
 
 
@@ -19,40 +19,33 @@ def export(
         typer.Option(
             "--to",
             metavar="FORMAT",
-            help="csv, parquet, mat (MATLAB), mcap (Foxglove), rrd (Rerun) or ulog "
-            "(PX4); told by the ending of --out if not given.",
+            help="csv, parquet, mat, mcap, rrd or ulog; else by the ending of --out.",
         ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="File to write; beside the flight if not given.")
     ] = None,
     every: Annotated[int, typer.Option(metavar="N", help="Write one of N records.")] = 1,
-    units: Annotated[bool, typer.Option("--units/--no-units", help="Units in names or descriptions.")] = True,
-    layout: Annotated[
-        bool, typer.Option("--layout", help="With mcap: write a layout for Foxglove beside the file.")
-    ] = False,
+    units: Annotated[
+        bool, typer.Option("--units/--no-units", help="Units in the names of columns (csv, parquet).")
+    ] = True,
 ) -> None:
-    """Write a flight for other tools: tables, MATLAB, Foxglove, Rerun, PX4's log.
+    """Write a flight for other tools.
 
-    Example: rotorfault export results/calm/flight.nc --to mcap --every 10 --layout
+    csv and parquet are one table; mat is for MATLAB and Octave; mcap for Foxglove, with a layout; rrd for Rerun, with
+    its blueprint; ulog for PX4 Flight Review and PlotJuggler, with PX4's topics in PX4's frames.
+
+    Example: rotorfault export results/calm/flight.nc --to mcap
     """
-    from rotorfault.base.files import write_atomically
     from rotorfault.flight.flight import load
-    from rotorfault.results.export import FORMATS, format_of, foxglove_layout, target_of
-    from rotorfault.results.export import export as write
+    from rotorfault.results import exporters
 
     if to is None and out is None:
-        raise InputError(f"no format was given; give --to ({choices(FORMATS)}), or --out with its ending")
-    form = format_of(out) if to is None and out is not None else to or ""
-    if layout and form != "mcap":
-        raise InputError(f"--layout is for the format mcap; got --to {form}")
-    target = target_of(form, flight, out)
-    records = load(flight).records()
-    say(f"wrote {write(records, target, form, every, units)}")
-    if layout:
-        beside = target.with_suffix(".layout.json")
-        write_atomically(beside, lambda path: path.write_text(foxglove_layout(records), encoding="utf-8"))
-        say(f"wrote {beside}; in Foxglove: Layouts, Import from file")
+        raise InputError(f"--to: is missing; allowed: {', '.join(exporters.FORMATS)}; or give --out with an ending")
+    form = exporters.form_of(out) if to is None and out is not None else str(to)
+    exporters.writer_of(form)
+    written = exporters.write(load(flight).records(), exporters.target_of(form, flight, out), form, every, units)
+    say("\n".join(f"wrote {path}" for path in written))
 
 
 @app.command()

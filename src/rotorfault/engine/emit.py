@@ -157,7 +157,9 @@ class Emitter:
 
     def _compute(self, term: Term) -> None:
         code, op, args = self.code, term.op, term.args
-        if op in ("lt", "le"):
+        if op == "same":
+            self._numbers[term.index] = self._number(args[0])
+        elif op in ("lt", "le"):
             a, b = (self._number(x) for x in args)
             self._masks[term.index] = code.compare("olt" if op == "lt" else "ole", a, b)
         elif op == "and":

@@ -10,7 +10,7 @@ from rotorfault.base.progress import Busy
 from rotorfault.engine import cache, native
 from rotorfault.engine.batch import Batch
 from rotorfault.engine.cache import Compiled
-from rotorfault.engine.program import Program, program, trace
+from rotorfault.engine.program import Program, program, same_for_all, trace
 from rotorfault.maths.arrays import Array
 
 _FUNCTIONS = (("prepare", 2, 1), ("fly", 4, 2))
@@ -65,7 +65,8 @@ class Machines(NamedTuple):
 
     def get(self, with_signals: bool) -> Machine:
         """The program with or without signals, compiled if it is not yet."""
-        name = cache.key(self.batch.loop, native.compiler(), "recording" if with_signals else "quiet")
+        form = "recording" if with_signals else "quiet"
+        name = cache.key(self.batch.loop, native.compiler(), f"{form} {same_for_all(self.batch)}")
         written: Program | None = None
         if name is None:
             written = self._written(with_signals)
@@ -75,7 +76,7 @@ class Machines(NamedTuple):
         return _LOADED[name]
 
     def _written(self, with_signals: bool) -> Program:
-        return program(trace(self.batch), native.lanes(), with_signals)
+        return program(trace(self.batch, same_for_all(self.batch)), native.lanes(), with_signals)
 
 
 def _compiled(written: Program) -> Compiled:

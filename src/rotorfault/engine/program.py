@@ -22,16 +22,24 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rotorfault.engine.batch import Batch, drive_template, streams_of
 from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.structure import skeleton
 from rotorfault.engine.trace import Tape, Term
+from rotorfault.loop.closed_loop import LoopParameters
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
+from rotorfault.model.mixer import partner_of_first
 from rotorfault.model.signals import Command
+from rotorfault.model.vehicle import Vehicle
 
 SEED = ("seed", "index")  # rows after the parameters
+# Parameters of which 0 means that their part of the model is not there. It then costs nothing: the numbers are the
+# same to the last bit.
+ABSENT_AT_ZERO = frozenset({"vehicle.rotor_reaction", "belief.rotor_reaction"})
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
 
 
@@ -43,6 +51,13 @@ class Layout(NamedTuple):
     state: int
     shared: int
     signals: int
+
+
+class SameForAll(NamedTuple):
+    """What is the same in every flight of a batch."""
+
+    absent: tuple[int, ...] = ()  # rows of the parameters that switch a part of the model off
+    pairs: tuple[float | None, ...] = ()  # conditions of which rotors are opposite each other, where they are known
 
 
 class Section(NamedTuple):
@@ -69,8 +84,27 @@ class Program(NamedTuple):
     operations: Counter[str]  # of one step, by sort
 
 
-def trace(batch: Batch) -> Traced:
-    """Run the closed loop of a batch once, on terms."""
+def same_for_all(batch: Batch) -> SameForAll:
+    """What is the same in every flight of a batch and decides what need not be computed."""
+    names, values = leaf_names(batch.parameters), flatten(batch.parameters)
+    absent = tuple(
+        row
+        for row, (name, value) in enumerate(zip(names, values, strict=True))
+        if name in ABSENT_AT_ZERO and not np.any(value)
+    )
+    pairs = [np.asarray(x) for vehicle in _vehicles(batch.parameters) for x in partner_of_first(vehicle)]
+    return SameForAll(absent, tuple(float(x.flat[0]) if np.all(x == x.flat[0]) else None for x in pairs))
+
+
+def trace(batch: Batch, same: SameForAll = SameForAll()) -> Traced:  # noqa: B008
+    """Run the closed loop of a batch once, on terms.
+
+    Parameters
+    ----------
+    batch : Batch
+    same : SameForAll
+        What is chosen before the flights.
+    """
     loop, template = batch.loop, drive_template(batch)
     shared = batch.reference.shape[1]
     layout = Layout(
@@ -81,7 +115,7 @@ def trace(batch: Batch) -> Traced:
         signals=0,
     )
     tape = Tape()
-    state, parameters = _symbols(tape, "state", batch.state), _symbols(tape, "par", batch.parameters)
+    state, parameters = _symbols(tape, "state", batch.state), _parameters(tape, batch, same)
     seed, index = (tape.term("par", layout.parameters - len(SEED) + i) for i in range(len(SEED)))
     normals = [
         tape.term("normal", seed, index, state.steps, *stream, number)
@@ -91,25 +125,34 @@ def trace(batch: Batch) -> Traced:
     drive = unflatten(template, [*tape.leaves("shared", shared), *normals])
     if loop.plant.substeps <= MOST_IN_ONE:
         after, signals = loop.step(state, drive, parameters)
-        writes = [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(after))]
+        writes = _state_writes(tape, after, batch)
         only = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
         return Traced((only,), 1, layout._replace(signals=len(only.signals)))
 
     held, command, signals = loop.decide(state, drive, parameters)
     command = loop.limited(command, parameters)
-    decided = flatten(held)
     kept = flatten((command, state.steps * parameters.period))
-    writes = [("%state", row, tape.lift(x)) for row, x in enumerate(decided)]
+    writes = _state_writes(tape, held, batch)
     writes += [("%kept", row, tape.lift(x)) for row, x in enumerate(kept)]
     instant = Section(tape, writes, [tape.lift(x) for x in flatten(signals)])
 
     tape = Tape()
-    state, parameters = _symbols(tape, "state", batch.state), _symbols(tape, "par", batch.parameters)
+    state, parameters = _symbols(tape, "state", batch.state), _parameters(tape, batch, same)
     command, start = unflatten((Command(PerRotor.all(0.0), zeros()), 0.0), tape.leaves("kept", len(kept)))
     dt = parameters.period * (1.0 / loop.plant.substeps)
     moved = loop.substep(state, command, start + tape.term("count", 0) * dt, parameters, dt)
-    move = Section(tape, [("%state", row, tape.lift(x)) for row, x in enumerate(flatten(moved))], [])
+    move = Section(tape, _state_writes(tape, moved, batch), [])
     return Traced((instant, move), loop.plant.substeps, layout._replace(signals=len(instant.signals)))
+
+
+def _state_writes(tape: Tape, after: Any, batch: Batch) -> list[tuple[str, int, Term]]:
+    """What is written of the state; the zero of what no flight has only where the state does not begin with it."""
+    terms = [tape.lift(x) for x in flatten(after)]
+    begun = flatten(batch.state)
+    return [
+        ("%state", row, tape.constant(0.0) if term.absent and np.any(begun[row]) else term)
+        for row, term in enumerate(terms)
+    ]
 
 
 def same_code(one: Batch, *others: Batch) -> bool:
@@ -169,6 +212,23 @@ def _symbols(tape: Tape, kind: str, record: Any) -> Any:
     return unflatten(record, tape.leaves(kind, len(flatten(record))))
 
 
+def _parameters(tape: Tape, batch: Batch, same: SameForAll) -> Any:
+    """The parameters as terms, with what is known of them on the tape."""
+    leaves = tape.leaves("par", len(flatten(batch.parameters)))
+    for row in same.absent:
+        leaves[row] = tape.absent()
+    parameters = unflatten(batch.parameters, leaves)
+    conditions = [x for vehicle in _vehicles(parameters) for x in partner_of_first(vehicle)]
+    tape.known = {
+        condition.index: value for condition, value in zip(conditions, same.pairs, strict=False) if value is not None
+    }
+    return parameters
+
+
+def _vehicles(parameters: LoopParameters) -> tuple[Vehicle, Vehicle]:
+    return parameters.vehicle, parameters.belief
+
+
 def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
     """Write the program of a closed loop.
 
@@ -187,7 +247,7 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
     before, pieces, prepared = Code(lanes, "p"), [], 0
     for number, section in enumerate(traced.sections):
         wanted = section.signals if with_signals else []
-        changed = [(p, row, term) for p, row, term in section.writes if (term.op, *term.args) != (p[1:], row)]
+        changed = [(p, row, term) for p, row, term in section.writes if not _stays(p, row, term)]
         writes = [*changed, *(("%out", row, term) for row, term in enumerate(wanted))]
         merged = merging(section.tape.terms, [*(term for _, _, term in section.writes), *section.signals])
         fixed = _fixed(term for _, _, term in writes)
@@ -221,6 +281,11 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
         for sort, count in piece.counts.items():
             operations[sort] += count * traced.substeps
     return Program(text, layout, operations)
+
+
+def _stays(pointer: str, row: int, term: Term) -> bool:
+    """Whether a row holds what is to be written: what it held before, or the zero of what no flight has."""
+    return (term.op, *term.args) == (pointer[1:], row) or (term.absent and pointer == "%state")
 
 
 def _body(pieces: list[Code], substeps: int) -> str:

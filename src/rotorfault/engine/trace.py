@@ -10,6 +10,13 @@ only.
 
 As everywhere, a literal zero times anything is zero: sparse matrices cost nothing, and hide a NaN in the other
 factor.
+
+What is the same in all flights of a batch is chosen before they fly. A condition that is known (`Tape.known`) takes
+one side of its choices and drops the other. A parameter that switches a part of the model off (`Tape.absent`) is a
+zero that takes its part of the trace with it. Either leaves the numbers as they are to the last bit, for the rounding
+of the rest does not change: what was used by that which is gone still counts as used
+(`rotorfault.engine.emit.merging`), a product is still rounded before it is added to what is not there, and a sum with
+that is not taken for the other summand, which other sums may have.
 """
 
 from __future__ import annotations
@@ -41,6 +48,7 @@ class Tape:
 
     def __init__(self) -> None:
         self.terms: list[Term] = []
+        self.known: dict[int, float] = {}  # conditions that are the same in every flight, by index: 1 or 0
         self._by_key: dict[tuple[Any, ...], Term] = {}
 
     def term(self, op: str, *args: Any) -> Term:
@@ -55,6 +63,10 @@ class Tape:
     def constant(self, value: float) -> Term:
         """The term of a number; 0.0 and -0.0 are two."""
         return self.term("const", float(value), math.copysign(1.0, value))
+
+    def absent(self) -> Term:
+        """Zero, in place of a parameter that switches a part of the model off in every flight."""
+        return self.term("const", 0.0, 1.0, "absent")
 
     def leaves(self, kind: str, count: int) -> list[Term]:
         """Rows that are read: 'par' (parameters of the flight), 'state', 'shared' (inputs of each step)."""
@@ -96,6 +108,11 @@ class Term:
         return self.op in _TRUTHS
 
     @property
+    def absent(self) -> bool:
+        """Whether it stands for what no flight has."""
+        return self.op == "const" and len(self.args) == 3
+
+    @property
     def value(self) -> float | None:
         """The number, for a term of level 0."""
         return self.args[0] if self.op == "const" else None
@@ -129,6 +146,10 @@ class Term:
 
 def add(a: Term, b: Term) -> Term:
     """a + b."""
+    if b.absent:
+        a, b = b, a
+    if a.absent:
+        return a.tape.term("add", *_ordered(a, b)) if _is_product(b) else a.tape.term("same", b)
     if a.value is not None and b.value is not None:
         return a.tape.constant(a.value + b.value)
     if b.value == 0.0:
@@ -144,6 +165,10 @@ def add(a: Term, b: Term) -> Term:
 
 def subtract(a: Term, b: Term) -> Term:
     """a - b."""
+    if b.absent:
+        return a.tape.term("sub", a, b) if _is_product(a) else a.tape.term("same", a)
+    if a.absent:
+        return a.tape.term("sub", a, b) if _is_product(b) else a.tape.term("same", negate(b))
     if a.value is not None and b.value is not None:
         return a.tape.constant(a.value - b.value)
     if b.value == 0.0:
@@ -159,6 +184,11 @@ def subtract(a: Term, b: Term) -> Term:
 
 def multiply(a: Term, b: Term) -> Term:
     """a b."""
+    if b.absent:
+        a, b = b, a
+    if a.absent:
+        a.tape.term("unused", b)
+        return a
     if a.value is not None and b.value is not None:
         return a.tape.constant(a.value * b.value)
     if b.value is not None:
@@ -181,6 +211,9 @@ def multiply(a: Term, b: Term) -> Term:
 
 def divide(a: Term, b: Term) -> Term:
     """a / b; by a parameter or a number it is a product with the reciprocal."""
+    if a.absent:
+        a.tape.term("unused", b)
+        return a
     if a.value is not None and b.value is not None:
         if b.value == 0.0:
             return a.tape.constant(math.nan if a.value == 0.0 or math.isnan(a.value) else a.value * math.inf)
@@ -194,11 +227,18 @@ def divide(a: Term, b: Term) -> Term:
 
 def negate(a: Term) -> Term:
     """-a."""
+    if a.absent:
+        return a
     if a.value is not None:
         return a.tape.constant(-a.value)
     if a.op == "neg":
         return a.args[0]  # type: ignore[no-any-return]
     return a.tape.term("neg", a)
+
+
+def _is_product(a: Term) -> bool:
+    """Whether it would be fused into a sum."""
+    return (a.args[0] if a.op == "neg" else a).op == "mul"
 
 
 def _ordered(a: Term, b: Term) -> tuple[Term, Term]:
@@ -253,7 +293,8 @@ def _compare(op: str, a: Operand, b: Operand, holds: Callable[[float, float], bo
     tape = _tape_of(a, b)
     x, y = tape.lift(a), tape.lift(b)
     if x.value is not None and y.value is not None:
-        return tape.constant(1.0 if holds(x.value, y.value) else 0.0)
+        held = holds(x.value, y.value)
+        return tape.absent() if not held and (x.absent or y.absent) else tape.constant(1.0 if held else 0.0)
     return tape.term(op, x, y)
 
 
@@ -265,6 +306,11 @@ def select(condition: Operand, a: Operand, b: Operand) -> Operand:
     if condition.value is not None:
         return a if condition.value else b
     x, y = tape.lift(a), tape.lift(b)
+    known = _known(condition)
+    if known is not None:
+        tape.term("unused", x)
+        tape.term("unused", y)
+        return x if known else y
     if x is y:
         return x
     if condition.truth and x.value == 1.0 and y.value == 0.0:
@@ -272,6 +318,20 @@ def select(condition: Operand, a: Operand, b: Operand) -> Operand:
     if condition.op == "not":
         condition, x, y = condition.args[0], y, x
     return tape.term("select", condition, x, y)
+
+
+def _known(condition: Term) -> float | None:
+    """A condition that is the same in every flight, or made of such."""
+    known = condition.tape.known
+    if condition.index in known or not condition.truth or condition.level != 1:
+        return known.get(condition.index)
+    if condition.op == "not":
+        inside = _known(condition.args[0])
+        return None if inside is None else 1.0 - inside
+    if condition.op == "and":
+        first, second = _known(condition.args[0]), _known(condition.args[1])
+        return None if first is None or second is None else first * second
+    return None
 
 
 def minimum(a: Operand, b: Operand) -> Term:
@@ -286,14 +346,24 @@ def maximum(a: Operand, b: Operand) -> Term:
 
 def _extreme(op: str, a: Operand, b: Operand) -> Term:
     tape = _tape_of(a, b)
+    z: Term
+    low: Term
     x, y = _ordered(tape.lift(a), tape.lift(b))
     if x is y:
         return x
     if x.value is not None and y.value is not None:
         return tape.constant((scalar.minimum if op == "min" else scalar.maximum)(x.value, y.value))
+    for one, other in ((x, y), (y, x)):
+        if op == "min" and one.op == "max":
+            # Put between two limits twice, min(max(z, low), high) with z that has been: it is z already.
+            for z, low in (one.args, one.args[::-1]):
+                if z.op == "min" and other in z.args and any(a.op == "max" and low in a.args for a in z.args):
+                    return z
     return tape.term(op, x, y)
 
 
 def absolute(a: Term) -> Term:
     """Magnitude."""
+    if a.absent:
+        return a
     return absolute(a.args[0]) if a.op in ("neg", "abs") else a.tape.term("abs", a)

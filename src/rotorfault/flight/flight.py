@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
-from rotorfault.results.export import export
+from rotorfault.results import exporters
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
@@ -149,35 +149,6 @@ class Flight:
 
         return Shown(label, self.records(), rows(self.summary()), self.source)
 
-    def export(self, path: str | Path, to: str | None = None, every: int = 1, units: bool = True) -> Path:
-        """Write the flight for another tool.
-
-        Parameters
-        ----------
-        path : str or Path
-        to : str, optional
-            ``"csv"``, ``"parquet"``, ``"mat"`` (MATLAB), ``"mcap"`` (Foxglove), ``"rrd"`` (Rerun) or ``"ulog"``
-            (PX4); told by the ending of the path if not given, which is ``.ulg`` for ULog.
-        every : int
-            Of so many records one is written, from the first on.
-        units : bool
-            Whether names of columns, or their descriptions, have units.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        InputError
-            If there is no such format, `every` is no whole number from 1 on, the folder does not exist, or the flight
-            does not fit into the format.
-        MissingExtraError
-            If the format needs a library that is not installed.
-        """
-        return export(self.records(), Path(path), to, every, units)
-
     def animate(
         self,
         path: str | Path,
@@ -239,7 +210,30 @@ class Flight:
         InputError
             If `every` is no whole number from 1 on, or the folder does not exist.
         """
-        return self.export(path, "csv", every, units)
+        return self.export(path, "csv", every=every, units=units)
+
+    def export(self, path: str | Path, to: str | None = None, *, every: int = 1, units: bool = True) -> Path:
+        """Write the flight for another tool: Foxglove, Rerun, PlotJuggler, PX4 Flight Review, MATLAB, tables.
+
+        Parameters
+        ----------
+        path : str or Path
+        to : str, optional
+            ``csv``, ``parquet``, ``mat``, ``mcap``, ``rrd`` or ``ulog``; by the ending of the path if not given.
+        every : int
+            Of so many records one is written, from the first on.
+        units : bool
+            Whether names of columns end in their unit, in ``csv`` and ``parquet``; the others have units besides.
+
+        Raises
+        ------
+        InputError
+            If there is no such format, `every` is no whole number from 1 on, the flight does not fit the format, or
+            the folder does not exist.
+        MissingExtraError
+            If the library of the format is not there.
+        """
+        return exporters.write(self.records(), Path(path), to, every, units)[0]
 
     def records(self) -> FlightData:
         """The records as plain arrays, on the same memory."""

@@ -65,6 +65,7 @@ from rotorfault.maths.scalar import (
     either,
     greater,
     greater_equal,
+    is_condition,
     is_finite,
     less,
     less_equal,
@@ -365,8 +366,10 @@ def _is_finite(signals: Any, new: Scores) -> Scalar:
     """1 where every number of the true state, of commands, of the cost and of what parts tell of themselves is."""
     rows = flatten((signals.position, signals.velocity, signals.quaternion, signals.body_rates, signals.thrust))
     rows += flatten((signals.thrust_command, new.cost, signals.parts))
-    total = rows[0]
-    for row in rows[1:]:
+    # Of a condition it is known before the flight that it is.
+    first, *others = [row for row in rows if not is_condition(row)]
+    total = first
+    for row in others:
         total = total + row  # infinite or NaN where any is
     return is_finite(total)
 

@@ -388,3 +388,8 @@ def is_finite(x: Scalar) -> Scalar:
     """1 where x is an ordinary number, 0 where it is NaN or infinite."""
     f = _of(x)
     return f.less_equal(x, sys.float_info.max) * f.less_equal(-sys.float_info.max, x)
+
+
+def is_condition(x: Scalar) -> bool:
+    """Whether it is known to be 1 or 0 by nature, as only of symbols it is."""
+    return bool(getattr(x, "truth", False))

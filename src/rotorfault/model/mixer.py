@@ -37,8 +37,14 @@ class PairDemand(NamedTuple):
     D34: Scalar  # N, F3 - F4
 
 
-def _partner_of_first(vehicle: Vehicle) -> tuple[Scalar, Scalar]:
-    """1 or 0: whether the partner of rotor 1 is rotor 2, and whether it is rotor 3; else it is rotor 4."""
+def partner_of_first(vehicle: Vehicle) -> tuple[Scalar, Scalar]:
+    """1 or 0: whether the partner of rotor 1 is rotor 2, and whether it is rotor 3; else it is rotor 4.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Two opposite pairs of rotors in any order.
+    """
     s = vehicle.rotor_yaw_sign
     return less(0.0, s.r1 * s.r2), less(0.0, s.r1 * s.r3)
 
@@ -53,7 +59,7 @@ def in_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
     values : PerRotor
         In the order of the vehicle.
     """
-    second, third = _partner_of_first(vehicle)
+    second, third = partner_of_first(vehicle)
     r1, r2, r3, r4 = values
     return PerRotor(
         r1,
@@ -73,7 +79,7 @@ def from_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
     values : PerRotor
         In the order of pairs.
     """
-    second, third = _partner_of_first(vehicle)
+    second, third = partner_of_first(vehicle)
     r1, r2, r3, r4 = values
     return PerRotor(
         r1,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, clip, exp
+from rotorfault.model.signals import FOLLOWING, Stuck
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
 
 
@@ -66,9 +67,19 @@ def limited(vehicle: Vehicle, command: PerRotor) -> PerRotor:
     return command.map(lambda c: clip(c, vehicle.thrust_min, vehicle.thrust_max))
 
 
-def effect_of(vehicle: Vehicle, loss: PerRotor) -> PerRotor:
-    """Steady thrust per commanded thrust of each rotor, (1 - loss) k of (7), (8)."""
-    return loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
+def effect_of(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING) -> PerRotor:
+    """Steady thrust per commanded thrust of each rotor, (1 - loss) k of (7), (8); 0 where it is stuck.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    loss : PerRotor
+        0 to 1.
+    stuck : Stuck
+        Rotors that do not follow; none if not given.
+    """
+    effect: PerRotor = stuck.effectiveness(loss) * vehicle.rotor_gain
+    return effect
 
 
 def lag_held(output: Scalar, entering: Scalar, bandwidth: Scalar, dt: Scalar) -> tuple[Scalar, Scalar]:

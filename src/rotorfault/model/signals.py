@@ -11,7 +11,7 @@ from typing import Generic, NamedTuple, TypeVar
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.scalar import Scalar, select
 
 T = TypeVar("T")
 
@@ -118,6 +118,43 @@ class Reference(NamedTuple):
         return record_line(self)
 
 
+class Stuck(NamedTuple):
+    """Rotors that give a thrust of their own, whatever they are commanded."""
+
+    rotor: PerRotor = PerRotor.all(0.0)  # 1 where that is so
+    thrust: PerRotor = PerRotor.all(0.0)  # N: what they give then; 0 for others
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+    def effectiveness(self, loss: PerRotor) -> PerRotor:
+        """Thrust per that of a sound rotor which follows its command, beside which a stuck rotor gives its own.
+
+        Parameters
+        ----------
+        loss : PerRotor
+            Of each rotor, 0 to 1; that of a stuck one is not looked at.
+        """
+        return self.rotor.map(lambda on, left: select(on, 0.0, left), 1.0 - loss)
+
+    def thrust_of(self, sound: PerRotor, loss: PerRotor) -> PerRotor:
+        """Thrust of each rotor in N.
+
+        Parameters
+        ----------
+        sound : PerRotor, N
+            Of sound rotors, by their commands.
+        loss : PerRotor
+            Of each rotor, 0 to 1.
+        """
+        thrust: PerRotor = sound * self.effectiveness(loss) + self.thrust
+        return thrust
+
+
+FOLLOWING = Stuck()
+"""Every rotor follows its command."""
+
+
 class Diagnosis(NamedTuple):
     """The autopilot's belief about the rotors."""
 
@@ -126,6 +163,7 @@ class Diagnosis(NamedTuple):
     estimate: PerRotor  # raw estimated loss, before any decision
     residual: PerRotor  # N: estimated thrust less the thrust that a healthy rotor would give
     test: PerRotor = PerRotor.all(0.0)  # N: least thrust of a sound rotor to command, to see whether it gives any
+    stuck: Stuck = FOLLOWING  # rotors that do not follow; their loss is the share that is missing at this instant
 
     def __repr__(self) -> str:
         return record_line(self)

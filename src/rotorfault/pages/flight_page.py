@@ -21,14 +21,15 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.base.plain_text import argument, one_line
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import wrench_of
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.pages.panels import Panel, derived, panels
 from rotorfault.pages.style import environment, script_data
 from rotorfault.pages.tracks import packed, packed_times, thinned
-from rotorfault.pages.verdict import headline, true_vehicle
+from rotorfault.pages.verdict import headline
 from rotorfault.results.events import events
 from rotorfault.results.flight_data import FlightData
+from rotorfault.results.flown import configuration_of, true_vehicle_file
 
 MOST = 6  # flights on a page: as many as there are colours that colour-blind readers tell apart
 ROOM = 5_500_000  # characters of data: the page stays below 8 MB with its program
@@ -103,13 +104,13 @@ def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
         "flights": [
             {
                 "label": _short(flight.label),
-                "vehicle": _vehicle(data, vehicle),
+                "vehicle": _vehicle(data, file),
                 "events": [event._asdict() for event in events(flight.data)],
                 "panels": [_panel(panel) for panel in panels(data, _limits(data))],
                 "ground": _ground(data),
                 **track,
             }
-            for flight, (data, vehicle), (track, _) in zip(flights, whole, tracks, strict=True)
+            for flight, (data, file), (track, _) in zip(flights, whole, tracks, strict=True)
         ]
     }
 
@@ -120,9 +121,9 @@ def _thinned(payload: Mapping[str, Any]) -> str:
     return "" if most == 1 else f", and one of {most} records is kept but around events, where all are"
 
 
-def _complete(flight: Shown) -> tuple[FlightData, Vehicle | None]:
-    vehicle = true_vehicle(flight.data)
-    return derived(flight.data, vehicle), vehicle
+def _complete(flight: Shown) -> tuple[FlightData, VehicleFile | None]:
+    file = true_vehicle_file(flight.data)
+    return derived(flight.data, None if file is None else file.vehicle), file
 
 
 def _tracks(data: FlightData, every: int, dense: float) -> tuple[dict[str, Any], int]:
@@ -161,19 +162,11 @@ def _limits(data: FlightData) -> dict[str, float]:
     return {key: float(data.attrs[key]) for key in ("thrust_min", "thrust_max") if key in data.attrs}
 
 
-def _configuration(data: FlightData) -> Mapping[str, Any]:
-    try:
-        tables = json.loads(data.attrs.get("configuration", "{}"))
-    except ValueError:
-        return {}
-    return tables if isinstance(tables, dict) else {}
-
-
-def _vehicle(data: FlightData, vehicle: Vehicle | None) -> dict[str, Any] | None:
+def _vehicle(data: FlightData, file: VehicleFile | None) -> dict[str, Any] | None:
     """What is drawn of a vehicle: rotors where they are, and what their thrusts do."""
-    if vehicle is None:
+    if file is None:
         return None
-    file = VehicleFile.model_validate(_configuration(data)["vehicle"])
+    vehicle = file.vehicle
     count = len(file.rotor)
     units = [PerRotor.of([float(i == k) for i in range(count)]) for k in range(count)]
     wrenches = [wrench_of(vehicle, unit) for unit in units]
@@ -196,7 +189,7 @@ def _vehicle(data: FlightData, vehicle: Vehicle | None) -> dict[str, Any] | None
 
 
 def _ground(data: FlightData) -> float | None:
-    ground = _configuration(data).get("ground")
+    ground = configuration_of(data).get("ground")
     height = ground.get("height") if isinstance(ground, dict) else ground
     return float(height) if isinstance(height, (int, float)) and not isinstance(height, bool) else None
 
@@ -208,7 +201,7 @@ def _provenance(flight: Shown) -> dict[str, Any]:
     versions = json.loads(attributes.get("versions", "{}"))
     return {
         "label": _short(flight.label),
-        "description": _short(_configuration(flight.data).get("description", ""), 400),
+        "description": _short(configuration_of(flight.data).get("description", ""), 400),
         "facts": [
             ("scenario", _short(attributes.get("scenario", ""))),
             ("controller", _short(attributes.get("controller", ""))),

@@ -13,10 +13,9 @@ from rotorfault.analysis.hover import hover_margin
 from rotorfault.loop.scores import RECOVERED, SURVIVED
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.vehicle import Vehicle
-from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.results.events import faults_of, isolation_time, onsets
 from rotorfault.results.flight_data import FlightData
+from rotorfault.results.flown import true_vehicle_file
 
 HOLD_THRUST = ("stuck",)  # faults that are no loss: what a rotor can give does not follow from one
 LOOKS = {"settled": "good", "tracked": "good", "landed": "good", "offset": "fair", "interrupted": "fair"}
@@ -52,17 +51,6 @@ def headline(data: FlightData) -> list[Fact]:
     if (fact := _margin(data)) is not None:
         facts.append(fact)
     return facts
-
-
-def true_vehicle(data: FlightData) -> Vehicle | None:
-    """The vehicle that flew, with its mismatch; None where the records do not tell or it has another form."""
-    try:
-        configuration = json.loads(data.attrs.get("configuration", "{}"))
-        mismatch = configuration.get("mismatch", {})
-        factors = {key: float(mismatch[key]) for key in ("mass", "rotor_gain", "linear_drag") if key in mismatch}
-        return VehicleFile.model_validate(configuration["vehicle"]).with_factors(factors).vehicle
-    except (KeyError, ValueError, TypeError, AttributeError):
-        return None
 
 
 def _outcome(data: FlightData) -> Fact:
@@ -112,11 +100,12 @@ def _consequences(scores: Mapping[str, Any]) -> list[Fact]:
 
 def _margin(data: FlightData) -> Fact | None:
     """The least that hover had in reserve: what the true rotors could lift with all torques in balance."""
-    vehicle = true_vehicle(data)
-    if vehicle is None or "loss_true" not in data or len(data["time"].values) == 0:
+    file = true_vehicle_file(data)
+    if file is None or "loss_true" not in data or len(data["time"].values) == 0:
         return None
     if any(fault.get("kind") in HOLD_THRUST for rotor in _rotors(data) for fault in faults_of(data, rotor)):
         return None
+    vehicle = file.vehicle
     loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
     if loss.shape[1] != len(PerRotor.__slots__):
         return None

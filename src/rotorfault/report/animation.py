@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 
 from rotorfault.maths.arrays import Array
 from rotorfault.report.path_figure import once
-from rotorfault.report.style import BLACK, BLUE, GREY, STYLE, VERMILION, shown
+from rotorfault.report.style import BLACK, BLUE, GREY, STYLE, VERMILION, colours_of_loss, shown
 from rotorfault.report.vehicle_view import CAMERA, VehicleView, rotations
 from rotorfault.results.airframe import airframe_of
 from rotorfault.results.events import events
-from rotorfault.results.exporters.content import colours
 from rotorfault.results.flight_data import FlightData
 
 INCHES = 9.6  # width of the figure, whatever its pixels are: so letters grow with it
@@ -77,7 +76,7 @@ class Animation:
         self._thrust, self._command = thrust / most, self._values("thrust_command") / most
         self._loss = np.clip(self._values("loss_true"), 0.0, 1.0)
         self._believed, self._flag = self._values("loss_believed"), self._values("fault_flag") > 0.5
-        self._colour = colours(self._loss) / 255.0
+        self._colour = colours_of_loss(self._loss) / 255.0
         self._events = [event for event in events(data) if event.kind in (*TOLD, "end")]
         with rc_context(STYLE):
             self._figure = Figure(figsize=(INCHES, INCHES * SHAPE), dpi=width / INCHES)
@@ -175,7 +174,7 @@ class Animation:
         self._moving += self._large.artists
         self._figure.text(0.645, 0.955, "thrusts, coloured by true loss", fontsize=9.0, va="center", color=BLACK)
         scale = self._figure.add_axes((0.865, 0.945, 0.105, 0.02))
-        scale.imshow(colours(np.linspace(0.0, 1.0, 64))[None], aspect="auto", extent=(0.0, 100.0, 0.0, 1.0))
+        scale.imshow(colours_of_loss(np.linspace(0.0, 1.0, 64))[None], aspect="auto", extent=(0.0, 100.0, 0.0, 1.0))
         scale.set(xticks=[0.0, 50.0, 100.0], yticks=[])
         scale.set_xticklabels(["0", "50", "100 %"], fontsize=6.5)
         scale.tick_params(length=2.0, pad=1.5)

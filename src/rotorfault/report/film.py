@@ -19,7 +19,7 @@ from rotorfault.base.errors import InputError, choices, missing_extra
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.base.progress import Bar
 from rotorfault.report.animation import Animation
-from rotorfault.results.exporters.content import colours
+from rotorfault.report.style import colours_of_loss
 from rotorfault.results.flight_data import FlightData
 
 NARROWEST, WIDEST = 320, 3840  # pixels
@@ -161,7 +161,7 @@ def _write_gif(path: Path, pictures: Iterator[NDArray[np.uint8]], fps: float) ->
 
 def _palette(picture: Image.Image) -> Image.Image:
     """Colours of all pictures: those of the first one, and those that rotors can take."""
-    scale = colours(np.linspace(0.0, 1.0, 40))
+    scale = colours_of_loss(np.linspace(0.0, 1.0, 40))
     strip = np.repeat(np.concatenate([scale, (0.82 * scale).astype(np.uint8)])[None], 40, axis=0)
     grey = picture.convert("RGB")
     both = Image.new("RGB", (max(grey.width, strip.shape[1]), grey.height + strip.shape[0]), "white")

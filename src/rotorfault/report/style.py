@@ -150,3 +150,23 @@ def number(value: float) -> str:
         return f"{value:.3g}".replace("-", "−")
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"${mantissa}\\times 10^{{{int(exponent)}}}$"
+
+
+def colours_of_loss(loss: Array) -> NDArray[np.uint8]:
+    """Colours of rotors by their true loss: blue for none, then from yellow to vermilion, where all is lost.
+
+    A small loss stands out: yellow is reached at 15 %.
+
+    Parameters
+    ----------
+    loss : ndarray
+        From 0 to 1.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Red, green, blue. The ends are those of Okabe and Ito, which colour-blind readers can tell apart.
+    """
+    stops = np.array([(0x00, 0x72, 0xB2), (0xF0, 0xE4, 0x42), (0xD5, 0x5E, 0x00)], dtype=float)
+    mixed = [np.interp(loss, (0.0, 0.15, 1.0), stops[:, k]) for k in range(3)]
+    return np.stack(mixed, axis=-1).round().astype(np.uint8)

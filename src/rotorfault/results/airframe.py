@@ -5,7 +5,6 @@ Any number of rotors. Where a file's vehicle cannot be read there are none, and 
 
 from __future__ import annotations
 
-import json
 import math
 from itertools import combinations
 from typing import NamedTuple
@@ -16,8 +15,8 @@ from numpy.typing import NDArray
 from rotorfault.base.one_line import cut
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
-from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.results.flight_data import FlightData
+from rotorfault.results.flown import vehicle_file_of
 
 DISC = 0.27  # radius of a disc over the least distance of two rotors; vehicle files do not say it
 
@@ -68,9 +67,8 @@ def airframe_of(data: FlightData) -> Airframe:
     ----------
     data : FlightData
     """
-    try:
-        file = VehicleFile.model_validate(json.loads(data.attrs["configuration"])["vehicle"])
-    except (KeyError, ValueError, TypeError):
+    file = vehicle_file_of(data)
+    if file is None:
         nothing = np.zeros((0, 3))
         return Airframe("vehicle", nothing, np.zeros(0), (), 0.0, float(data.attrs.get("thrust_max", 1.0)), 0.0)
     vehicle = file.vehicle

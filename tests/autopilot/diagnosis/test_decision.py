@@ -23,6 +23,7 @@ from rotorfault.autopilot.diagnosis.decision import (
     undecided,
 )
 from rotorfault.autopilot.diagnosis.model_error import Misstated
+from rotorfault.autopilot.diagnosis.stuck import StuckParameters
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor
@@ -35,6 +36,7 @@ VEHICLE = load_vehicle("paper").vehicle
 HOVER = hover_thrust(VEHICLE).r1
 T = 1e-3
 TEST_TIME = 0.1
+STUCK = StuckParameters(lateness=0.014, settled=0.033, missed=0.06)
 
 
 def arr(values: PerRotor) -> Array:
@@ -56,7 +58,7 @@ def step(
 
 
 def numbers(**settings: float) -> DecisionParameters:
-    return decision_parameters(DecisionSettings(**settings), TEST_TIME)
+    return decision_parameters(DecisionSettings(**settings), TEST_TIME, STUCK)
 
 
 def decisions(

@@ -82,6 +82,7 @@ def watch(
 
     before = now = seen(state, 0.0)
     memory, rows = None, []
+    last = rotor_speeds(vehicle, expected_thrust(rotors, vehicle))
     for k in range(steps):
         now = seen(state, k * T)
         thrust = expected_thrust(rotors, vehicle)
@@ -91,7 +92,8 @@ def watch(
             mean_thrust=rotors.mean,
             thrust=thrust,
             residual_speed=residual_speed(vehicle, rotor_speeds(vehicle, thrust)),
-            residual_change=0.0,
+            speed=last,
+            sped=PerRotor.all(0.0),
             direct_acceleration_W=zeros(),
             elapsed=T if k else 0.0,
         )

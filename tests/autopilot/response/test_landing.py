@@ -44,7 +44,8 @@ class Pilot:
             mean_thrust=PerRotor.all(0.0),
             thrust=PerRotor(third, third, 0.0, third),
             residual_speed=0.0,
-            residual_change=0.0,
+            speed=PerRotor.all(0.0),
+            sped=PerRotor.all(0.0),
             direct_acceleration_W=zeros(),
             elapsed=0.0,  # so that the model explains no change of the velocity
         )

@@ -13,6 +13,7 @@ from rotorfault.pages.style import STYLE
 from rotorfault.studies.paper import answer
 from rotorfault.studies.paper.cases import CASES, run_of
 from rotorfault.studies.paper.page import PICTURE, Page, render
+from rotorfault.studies.paper.replays import Replay
 from rotorfault.studies.paper.table1 import Costs, Row
 from rotorfault.studies.paper.verdicts import CONFIRMED, NOT_CONFIRMED, UNDER, Claim
 from rotorfault.studies.runs import Result
@@ -52,7 +53,7 @@ def page(tmp_path: Path) -> Page:
     (tmp_path / "figures").mkdir()
     for name in (PICTURE, "fig04"):
         write_atomically(tmp_path / "figures" / f"{name}.png", lambda path: path.write_bytes(PIXEL))
-    return Page(tmp_path, results, CLAIMS, True, {"flights": 1.0})
+    return Page(tmp_path, results, CLAIMS, True, {"flights": 1.0}, [Replay("Case 1", "flights/set-point.html")])
 
 
 def test_it_opens_with_its_answer_and_one_picture_before_all_tables(page: Page) -> None:
@@ -101,3 +102,8 @@ def test_its_style_knows_dark_mode_and_telephones(page: Page) -> None:
     light, dark = (STYLE.split(":root")[k].partition("}")[0] for k in (1, 2))
     used = set(re.findall(r"var\((--\w+)\)", STYLE))
     assert used <= set(re.findall(r"(--\w+):", light)) == set(re.findall(r"(--\w+):", dark))
+
+
+def test_the_flights_of_each_case_can_be_looked_at(page: Page) -> None:
+    assert '<a href="flights/set-point.html">Case 1</a>' in render(page)
+    assert "replayed in 3-D" not in render(page._replace(replays=[]))

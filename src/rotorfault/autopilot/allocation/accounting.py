@@ -28,7 +28,7 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
     wrench : Wrench
         The demand, thrust [N] and torque [N m, body axes].
     diagnosis : Diagnosis
-        Only the loss is used.
+        What is believed of the thrusts is used, and nothing else.
     command : PerRotor
         In N.
 
@@ -38,7 +38,7 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
         An axis counts as given up when more than `TOLERANCE` of the largest rotor command is missing or too much,
         measured in rotor thrust; NaN counts as given up.
     """
-    given = wrench_of(vehicle, command * effect_of(vehicle, diagnosis.loss))
+    given = wrench_of(vehicle, _given(vehicle, diagnosis, command))
     unallocated = Wrench(wrench.thrust - given.thrust, wrench.torque_B - given.torque_B)
     missing = pair_demand(vehicle, unallocated)
     tolerance = TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
@@ -65,10 +65,17 @@ def direct(vehicle: Vehicle, diagnosis: Diagnosis, command: PerRotor) -> tuple[W
     vehicle : Vehicle
         As believed.
     diagnosis : Diagnosis
-        Only the loss is used.
+        What is believed of the thrusts is used, and nothing else.
     command : PerRotor
         In N; put within the rotor limits.
     """
     command = limited(vehicle, command)
-    wrench = wrench_of(vehicle, command * effect_of(vehicle, diagnosis.loss))
+    wrench = wrench_of(vehicle, _given(vehicle, diagnosis, command))
     return wrench, account(vehicle, wrench, diagnosis, command)
+
+
+def _given(vehicle: Vehicle, diagnosis: Diagnosis, command: PerRotor) -> PerRotor:
+    """Steady thrusts in N that commands in N are believed to give."""
+    stuck = diagnosis.stuck
+    thrust: PerRotor = command * effect_of(vehicle, diagnosis.loss, stuck) + stuck.thrust
+    return thrust

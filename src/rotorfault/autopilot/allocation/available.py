@@ -15,6 +15,7 @@ from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.mixer import in_pairs
 from rotorfault.model.motion import effect_of
+from rotorfault.model.signals import FOLLOWING, Stuck
 from rotorfault.model.vehicle import Vehicle
 
 # Of the weight: thrust for which yaw is given up where it cannot be had in balance. Our choice: a fifth above the
@@ -22,7 +23,7 @@ from rotorfault.model.vehicle import Vehicle
 HOVER_RESERVE = 1.2
 
 
-def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
+def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING) -> Scalar:
     """Largest total thrust in N that position control should ask for.
 
     Parameters
@@ -30,6 +31,8 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
     vehicle : Vehicle
     loss : PerRotor
         Believed loss of each rotor.
+    stuck : Stuck
+        Rotors that are believed not to follow; their loss is not looked at.
 
     Returns
     -------
@@ -37,7 +40,7 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor) -> Scalar:
         In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
         this as there is with yaw given up.
     """
-    most = in_pairs(vehicle, effect_of(vehicle, loss) * vehicle.thrust_max)
+    most = in_pairs(vehicle, effect_of(vehicle, loss, stuck) * vehicle.thrust_max + stuck.thrust)
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
     with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
     return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

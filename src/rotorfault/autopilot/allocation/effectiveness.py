@@ -37,13 +37,16 @@ from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, clip, less, maximum, minimum, select
+from rotorfault.maths.records import select_record
+from rotorfault.maths.scalar import Scalar, absolute, clip, either, less, maximum, minimum, select, sqrt
 from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, pair_demand, rotor_thrusts
 from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
+
+TINY = 1e-12  # N: keeps quotients finite where both of their sides are 0
 
 
 class EffectivenessParameters(NamedTuple):
@@ -72,12 +75,14 @@ class Effectiveness(Allocator[Nothing, EffectivenessParameters]):
         self, memory: Nothing, inputs: AllocationInputs, parameters: EffectivenessParameters, dt: Scalar
     ) -> tuple[Nothing, Allocation, Record]:
         """Commands for a demanded wrench."""
-        wrench, diagnosis, vehicle, _ = inputs
-        return memory, allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min), Nothing()
+        wrench, diagnosis, vehicle, _, spin = inputs
+        return memory, allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min, spin), Nothing()
 
 
-def allocated(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiveness_min: Scalar) -> Allocation:
-    """Commands for a demanded wrench, in strict order: tilt, thrust, yaw.
+def allocated(
+    vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiveness_min: Scalar, spin: Scalar = 0.0
+) -> Allocation:
+    """Commands for a demanded wrench, in strict order: tilt, thrust, yaw; less strictly in a body that spins.
 
     Parameters
     ----------
@@ -86,26 +91,66 @@ def allocated(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, effectiven
     wrench : Wrench
         Demanded thrust [N] and torque [N m, body axes].
     diagnosis : Diagnosis
-        The loss, and the least thrust of rotors under test.
+        What is believed of the thrusts, and the least thrust of rotors under test.
     effectiveness_min : scalar
         Below it a rotor counts as dead.
+    spin : scalar, rad/s
+        Yaw rate of the body.
     """
-    effect = effect_of(vehicle, diagnosis.loss)
-    dead = diagnosis.loss.map(lambda loss: less(1.0 - loss, effectiveness_min))
+    stuck = diagnosis.stuck
+    effect = effect_of(vehicle, diagnosis.loss, stuck)
+    dead = stuck.effectiveness(diagnosis.loss).map(lambda left: less(left, effectiveness_min))
     least = diagnosis.test.map(lambda f: maximum(f / vehicle.rotor_gain, vehicle.thrust_min))
-    low = effect * least
-    high = dead.map(select, low, effect * vehicle.thrust_max)
+    low = effect * least + stuck.thrust
+    high = dead.map(select, low, effect * vehicle.thrust_max + stuck.thrust)
 
-    pairs = attainable_nearest(pair_demand(vehicle, wrench), in_pairs(vehicle, low), in_pairs(vehicle, high))
+    demand = pair_demand(vehicle, wrench)
+    in_order = in_pairs(vehicle, low), in_pairs(vehicle, high)
+    spinning = yielding(vehicle, in_pairs(vehicle, diagnosis.flagged), spin)
+    pairs = attainable_nearest(demand, *in_order, spinning)
     thrust = from_pairs(vehicle, rotor_thrusts(pairs)).map(clip, low, high)
 
     # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
     divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
-    command = limited(vehicle, (thrust - low) / divisor + least)
+    followed = (thrust - low) / divisor + least
+    # What a stuck rotor is told does nothing, if it is stuck: so it is told what would be right if it were not.
+    asked = from_pairs(vehicle, rotor_thrusts(demand)) / vehicle.rotor_gain
+    command = limited(vehicle, stuck.rotor.map(select, asked, followed))
     return account(vehicle, wrench, diagnosis, command)
 
 
-def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor) -> PairDemand:
+class Yielding(NamedTuple):
+    """How far the difference of one pair may yield to thrust and yaw."""
+
+    first: Scalar  # 1 where it is the pair of rotor 1, else 0
+    late: Scalar  # 0 to 1: share of a tilt torque that stands still in the world which the rotors' lag takes
+    stiffness: Scalar  # N: difference that the gyroscopic torque holds at an inclination of 1 rad; 0 for none
+
+
+def yielding(vehicle: Vehicle, flagged: PerRotor, spin: Scalar) -> Yielding:
+    """What a spinning body with a faulty rotor allows.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    flagged : PerRotor
+        1 where a fault is declared, in the order of pairs.
+    spin : scalar, rad/s
+        Yaw rate of the body.
+    """
+    w, squared = vehicle.rotor_bandwidth, spin * spin
+    x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)
+    y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
+    inertia = vehicle.inertia
+    gyroscopic = absolute(inertia.z - 0.5 * (inertia.x + inertia.y))
+    first, second = either(flagged.r1, flagged.r2), either(flagged.r3, flagged.r4)
+    beside = select(second, gyroscopic / sqrt(x3 * x3 + y3 * y3), 0.0)
+    lever = select(first, gyroscopic / sqrt(x1 * x1 + y1 * y1), beside)
+    return Yielding(first, squared / (w * w + squared), lever * squared)
+
+
+def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor, spinning: Yielding) -> PairDemand:
     """The lexicographically nearest pair sums and differences that rotors in [low, high] can give.
 
     Parameters
@@ -114,6 +159,8 @@ def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor) -> Pai
         In N.
     low, high : PerRotor
         Least and largest thrust of each rotor in N, in the order of pairs.
+    spinning : Yielding
+        How far the order gives way.
 
     Returns
     -------
@@ -122,14 +169,47 @@ def attainable_nearest(demand: PairDemand, low: PerRotor, high: PerRotor) -> Pai
     """
     D12 = clip(demand.D12, low.r1 - high.r2, high.r1 - low.r2)
     D34 = clip(demand.D34, low.r3 - high.r4, high.r3 - low.r4)
-    a, b = _sum_range(D12, low.r1, high.r1, low.r2, high.r2)
-    c, d = _sum_range(D34, low.r3, high.r3, low.r4, high.r4)
-    thrust = clip(demand.S12 + demand.S34, a + c, b + d)
-    yaw = demand.S12 - demand.S34
+    first, second = Pair(low.r1, high.r1, low.r2, high.r2), Pair(low.r3, high.r3, low.r4, high.r4)
+    (a, b), (c, d) = first.sums(D12), second.sums(D34)
+    thrust, yaw = demand.S12 + demand.S34, demand.S12 - demand.S34
+
+    pair, (D_demand, D, S, e, f) = select_record(
+        spinning.first, (first, (demand.D12, D12, demand.S12, c, d)), (second, (demand.D34, D34, demand.S34, a, b))
+    )
+    S = clip(S, maximum(pair.low_1 + pair.low_2, thrust - f), minimum(pair.high_1 + pair.high_2, thrust - e))
+    D = D + _yielded(D_demand, D, pair.differences(S), spinning)
+    D12, D34 = select(spinning.first, D, D12), select(spinning.first, D34, D)
+    yielded = pair.sums(D)
+    (a, b), (c, d) = select_record(spinning.first, (yielded, (c, d)), ((a, b), yielded))
+
+    thrust = clip(thrust, a + c, b + d)
     S12 = clip((thrust + yaw) * 0.5, maximum(a, thrust - d), minimum(b, thrust - c))
     return PairDemand(S12=S12, S34=thrust - S12, D12=D12, D34=D34)
 
 
-def _sum_range(D: Scalar, low_1: Scalar, high_1: Scalar, low_2: Scalar, high_2: Scalar) -> tuple[Scalar, Scalar]:
-    """Least and largest sum in N of a pair whose difference is D, from low <= (S +- D) / 2 <= high."""
-    return maximum(2.0 * low_1 - D, 2.0 * low_2 + D), minimum(2.0 * high_1 - D, 2.0 * high_2 + D)
+def _yielded(demand: Scalar, nearest: Scalar, room: tuple[Scalar, Scalar], spinning: Yielding) -> Scalar:
+    """By how much a pair's difference yields, towards what thrust and yaw leave room for."""
+    gap, missing = clip(demand, *room) - nearest, absolute(demand - nearest)
+    # Where the demand is met, or there is nothing to gain, nothing yields: 0 over the small term.
+    unmet = missing / (maximum(absolute(demand), missing) + TINY)
+    steep = spinning.stiffness / (spinning.stiffness + absolute(gap) + TINY)
+    return gap * (spinning.late * unmet * steep)
+
+
+class Pair(NamedTuple):
+    """Limits of two opposite rotors, in N."""
+
+    low_1: Scalar
+    high_1: Scalar
+    low_2: Scalar
+    high_2: Scalar
+
+    def sums(self, D: Scalar) -> tuple[Scalar, Scalar]:
+        """Least and largest sum in N where the difference is D, from low <= (S +- D) / 2 <= high."""
+        low, high = maximum, minimum
+        return low(2.0 * self.low_1 - D, 2.0 * self.low_2 + D), high(2.0 * self.high_1 - D, 2.0 * self.high_2 + D)
+
+    def differences(self, S: Scalar) -> tuple[Scalar, Scalar]:
+        """Least and largest difference in N where the sum is S."""
+        low, high = maximum, minimum
+        return low(2.0 * self.low_1 - S, S - 2.0 * self.high_2), high(2.0 * self.high_1 - S, S - 2.0 * self.low_2)

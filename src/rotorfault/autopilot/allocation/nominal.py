@@ -26,7 +26,7 @@ class Nominal(Allocator[Nothing, Nothing]):
         self, memory: Nothing, inputs: AllocationInputs, parameters: Nothing, dt: Scalar
     ) -> tuple[Nothing, Allocation, Record]:
         """Commands for a demanded wrench."""
-        wrench, diagnosis, vehicle, _ = inputs
+        wrench, diagnosis, vehicle, *_ = inputs
         thrust = nominal_inverse(vehicle, wrench)
         command = limited(vehicle, thrust / vehicle.rotor_gain)
         return memory, account(vehicle, wrench, diagnosis, command), Nothing()

@@ -68,13 +68,13 @@ class PaperRule(Allocator[Nothing, PaperRuleParameters]):
         self, memory: Nothing, inputs: AllocationInputs, parameters: PaperRuleParameters, dt: Scalar
     ) -> tuple[Nothing, Allocation, Record]:
         """Commands for a demanded wrench."""
-        wrench, diagnosis, vehicle, _ = inputs
+        wrench, diagnosis, vehicle, _, spin = inputs
         flagged = in_pairs(vehicle, diagnosis.flagged)
         thrust = from_pairs(vehicle, rule_thrusts(pair_demand(vehicle, wrench), flagged))
         command = limited(vehicle, thrust / vehicle.rotor_gain)
         allocation = select_record(
             falls_back(flagged),
-            allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min),
+            allocated(vehicle, wrench, diagnosis, parameters.effectiveness_min, spin),
             account(vehicle, wrench, diagnosis, command),
         )
         return memory, allocation, Nothing()

@@ -8,6 +8,7 @@ from rotorfault.autopilot.instant import Instant
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import Slot
@@ -21,6 +22,7 @@ class AllocationInputs(NamedTuple):
     diagnosis: Diagnosis  # believed
     vehicle: Vehicle  # belief, with two opposite pairs of rotors (see `rotorfault.model.mixer`)
     command: PerRotor  # N, sent at the last instant
+    spin: Scalar = 0.0  # rad/s: estimated yaw rate of the body
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -34,7 +36,13 @@ def _inputs(instant: Instant) -> AllocationInputs:
     wrench = instant.demand
     if isinstance(wrench, PerRotor):
         raise InputError("a controller that commands the rotors itself needs no allocation")
-    return AllocationInputs(wrench, instant.decision.diagnosis, instant.vehicle, instant.past.command.thrust)
+    return AllocationInputs(
+        wrench=wrench,
+        diagnosis=instant.decision.diagnosis,
+        vehicle=instant.vehicle,
+        command=instant.past.command.thrust,
+        spin=instant.estimate.omega_B.z,
+    )
 
 
 ALLOCATION = Slot(

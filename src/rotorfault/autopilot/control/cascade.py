@@ -177,7 +177,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         self, memory: CascadeMemory, inputs: ControlInputs, parameters: CascadeParameters, dt: Scalar
     ) -> tuple[CascadeMemory, ControlOutput, Record]:
         """One sampling instant."""
-        estimate, reference, vehicle = inputs.estimate, inputs.reference, inputs.vehicle
+        estimate, reference, vehicle, believed = inputs.estimate, inputs.reference, inputs.vehicle, inputs.diagnosis
         six_inputs = self.settings.six_inputs
         w0 = vehicle.rotor_bandwidth
         R_WB = estimate.q_WB.matrix()
@@ -214,7 +214,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
         torque_B = self.tracking.ahead_of_lag(
             (inner.u + attitude.feed_forward).times(vehicle.inertia),
-            wrench_of(vehicle, inputs.expected_thrust * (1.0 - inputs.diagnosis.loss)).torque_B,
+            wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B,
             estimate.omega_B,
             w0,
         )

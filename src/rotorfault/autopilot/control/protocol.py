@@ -80,7 +80,7 @@ def _inputs(instant: Instant) -> ControlInputs:
         expected_thrust=instant.expectation.thrust,
         prediction=instant.prediction,
         residual_speed=instant.expectation.residual_speed,
-        thrust_available=thrust_available(instant.vehicle, believed.loss),
+        thrust_available=thrust_available(instant.vehicle, believed.loss, believed.stuck),
     )
 
 

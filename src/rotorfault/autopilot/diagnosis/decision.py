@@ -37,6 +37,7 @@ from typing import NamedTuple
 from pydantic import Field, model_validator
 
 from rotorfault.autopilot.diagnosis.model_error import Misstated, Shares
+from rotorfault.autopilot.diagnosis.stuck import Seen, StuckMemory, StuckParameters, judged, nobody_judged
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import (
@@ -105,6 +106,7 @@ class DecisionParameters(NamedTuple):
     test_thrust: Scalar
     test_interval: Scalar  # s
     test_time: Scalar  # s: length of a test
+    stuck: StuckParameters
 
 
 class DecisionMemory(NamedTuple):
@@ -115,6 +117,7 @@ class DecisionMemory(NamedTuple):
     flagged: PerRotor  # 1 or 0
     smoothed: PerRotor  # smoothed loss
     tested: PerRotor  # s: time since the last test began
+    stuck: StuckMemory
 
 
 class Evidence(NamedTuple):
@@ -126,7 +129,7 @@ class Evidence(NamedTuple):
     noise: Scalar  # standard deviation of the difference of two residuals
 
 
-def decision_parameters(settings: DecisionSettings, test_time: float) -> DecisionParameters:
+def decision_parameters(settings: DecisionSettings, test_time: float, stuck: StuckParameters) -> DecisionParameters:
     """Numbers of the settings as a record.
 
     Parameters
@@ -134,6 +137,7 @@ def decision_parameters(settings: DecisionSettings, test_time: float) -> Decisio
     settings : DecisionSettings
     test_time : float, s
         How long a rotor needs to show its thrust.
+    stuck : StuckParameters
     """
     s = settings
     return DecisionParameters(
@@ -147,13 +151,14 @@ def decision_parameters(settings: DecisionSettings, test_time: float) -> Decisio
         s.test_thrust,
         s.test_interval,
         test_time,
+        stuck,
     )
 
 
 def undecided() -> DecisionMemory:
     """Nothing seen yet."""
     none = PerRotor.all(0.0)
-    return DecisionMemory(none, none, none, none, none)
+    return DecisionMemory(none, none, none, none, none, nobody_judged())
 
 
 def second_best(residual: PerRotor) -> Scalar:
@@ -265,7 +270,7 @@ def decide(
         test = select(both(doubted, less(tested, p.test_time)), small, 0.0)
         return threshold, test, since, below, flagged, smoothed, tested
 
-    before = (DecisionMemory(*values) for values in zip(*memory, strict=True))
+    before = (DecisionMemory(*values, memory.stuck) for values in zip(*memory[:-1], strict=True))
 
     def opposite(values: PerRotor) -> PerRotor:
         r1, r2, r3, r4 = in_pairs(vehicle, values)
@@ -274,7 +279,10 @@ def decide(
     partners, at_fault = opposite(evidence.residual), opposite(memory.flagged)
     known = (evidence.residual, partners, at_fault, evidence.thrust, *evidence.model_error)
     rows = zip(losses, *known, before, strict=True)
-    threshold, test, *after = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
-    decided = DecisionMemory(*after)
+    columns = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
+    threshold, test, since, below, flagged, smoothed, tested = columns
+    seen = Seen(evidence.thrust, evidence.residual, partners, at_fault, flagged)
+    judgement, held = judged(memory.stuck, seen, sound, hover, p.stuck, dt)
+    decided = DecisionMemory(since, below, flagged, smoothed, tested, judgement)
     loss = decided.smoothed * decided.flagged
-    return decided, Diagnosis(loss, decided.flagged, losses, evidence.residual, test), threshold
+    return decided, Diagnosis(loss, decided.flagged, losses, evidence.residual, test, held), threshold

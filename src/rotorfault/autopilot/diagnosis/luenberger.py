@@ -49,6 +49,7 @@ from rotorfault.autopilot.diagnosis.model_error import (
     nothing_shown,
 )
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+from rotorfault.autopilot.diagnosis.stuck import StuckParameters
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
@@ -103,6 +104,7 @@ class LuenbergerSignals(NamedTuple):
 
     threshold: Annotated[PerRotor, Q("N", NO_FRAME, "missing thrust above which a rotor is suspected")]
     test: Annotated[PerRotor, Q("N", NO_FRAME, "least command, to see whether a rotor is dead")]
+    stuck_thrust: Annotated[PerRotor, Q("N", NO_FRAME, "what a rotor gives that is believed not to follow; else 0")]
 
 
 class LuenbergerMemory(NamedTuple):
@@ -115,6 +117,7 @@ class LuenbergerMemory(NamedTuple):
     started: Scalar  # 0 before the first step, then 1
     model_error: ModelErrorMemory
     decision: DecisionMemory
+    stuck: PerRotor  # 1 where a rotor was last believed not to follow
 
 
 def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[float, float]:
@@ -175,13 +178,21 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         p, q = self.settings.poles
         gains = place(carry, decay, (math.exp(-p * period), math.exp(-q * period)))
         dynamics = Dynamics(*gains, noise_gain(*gains, period), math.exp(-w * period))
-        test_time = SHOWN / w + SHOWN / min(p, q)
-        return LuenbergerParameters(carry, decay, dynamics, decision_parameters(self.settings.decision, test_time))
+        shown, decision = SHOWN / min(p, q), self.settings.decision
+        stuck = StuckParameters(1.0 / p + 1.0 / q, shown, decision.clear_threshold)
+        return LuenbergerParameters(carry, decay, dynamics, decision_parameters(decision, SHOWN / w + shown, stuck))
 
     def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
         """Start at the estimated rates without deviation."""
         return LuenbergerMemory(
-            inputs.estimate.v_W.z, inputs.estimate.omega_B, 0.0, zeros(), 0.0, nothing_shown(), undecided()
+            inputs.estimate.v_W.z,
+            inputs.estimate.omega_B,
+            0.0,
+            zeros(),
+            0.0,
+            nothing_shown(),
+            undecided(),
+            PerRotor.all(0.0),
         )
 
     def step(
@@ -194,7 +205,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         # At the first step nothing has elapsed: the deviations (zero) must not be carried either.
         carry = parameters.carry * memory.started
         climb = memory.climb + climb_change * elapsed + cosine * memory.delta_z * carry
-        turned = omega_change * elapsed + reaction(inputs.expectation, vehicle)
+        turned = omega_change * elapsed + reaction(inputs.expectation, vehicle, memory.stuck)
         omega_B = memory.omega_B + turned + memory.delta_omega * carry
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
@@ -218,8 +229,9 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             started=1.0,
             model_error=wrong,
             decision=decision,
+            stuck=diagnosis.stuck.rotor,
         )
-        return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test)
+        return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test, diagnosis.stuck.thrust)
 
     def _model(self, inputs: DiagnosisInputs) -> tuple[Scalar, Scalar, Vec3]:
         """(cosine of the tilt, vertical acceleration, angular acceleration) of a sound vehicle, period's mean."""

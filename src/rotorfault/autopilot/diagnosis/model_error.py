@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, absolute, maximum, minimum, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, less, maximum, minimum, sqrt
 from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
 from rotorfault.model.motion import limited
 from rotorfault.model.signals import Wrench
@@ -73,7 +73,6 @@ class ModelErrorMemory(NamedTuple):
     reaction: Scalar  # rad/s: sensitivity of the yaw rate to the logarithm of the bandwidth, by the rotors' reaction
     reaction_innovation: Scalar  # rad/s
     reacting: Scalar  # rad/s^2: its derivative, late
-    speed: PerRotor  # rad/s: as believed
     spin_innovation: PerRotor  # rad/s
     spinning: PerRotor  # rad/s^2: derivative of the rotors' speeds, as believed, late
     time: Scalar  # s: that the noise has been looked at, `NOISE_MEMORY` at most
@@ -107,7 +106,7 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
 def nothing_shown() -> ModelErrorMemory:
     """Before the first instant."""
     none, still = PerRotor.all(0.0), zeros()
-    return ModelErrorMemory(none, none, none, still, still, still, still, 0.0, 0.0, 0.0, none, none, none, 0.0, still)
+    return ModelErrorMemory(none, none, none, still, still, still, still, 0.0, 0.0, 0.0, none, none, 0.0, still)
 
 
 def follow(
@@ -147,11 +146,12 @@ def follow(
     ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
     ran_ahead = residual_speed(vehicle, ahead_of_model) - expectation.residual_speed
     reaction = -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
-    reaction_innovation = memory.reaction_innovation * kept + reaction - memory.reaction - memory.reacting * elapsed
-    speed = rotor_speeds(vehicle, expectation.thrust)
-    # At the first instant, when nothing has elapsed, no speed is known from before.
-    sped = (speed - memory.speed) * minimum(elapsed * 1e9, 1.0)
-    spin_innovation = memory.spin_innovation * kept + sped - memory.spinning * elapsed
+    # On a vehicle without a reaction, which is known before the flight, nothing is remembered of it, and it is free.
+    there = less(0.0, vehicle.rotor_reaction)
+    before, reacting = memory.reaction * there, memory.reacting * there
+    reaction_innovation = (memory.reaction_innovation * there) * kept + reaction - before - reacting * elapsed
+    spinning = memory.spinning * there
+    spin_innovation = (memory.spin_innovation * there) * kept + expectation.sped * there - spinning * elapsed
     time = minimum(memory.time + elapsed, NOISE_MEMORY)
     # The mean at first, and later with an exponential window.
     share = elapsed / maximum(time, 1e-9)
@@ -166,10 +166,9 @@ def follow(
         product=memory.product + product_innovation * dynamics.gain_deviation,
         reaction=reaction,
         reaction_innovation=reaction_innovation,
-        reacting=memory.reacting + reaction_innovation * dynamics.gain_deviation,
-        speed=speed,
+        reacting=reacting + reaction_innovation * dynamics.gain_deviation,
         spin_innovation=spin_innovation,
-        spinning=memory.spinning + spin_innovation * dynamics.gain_deviation,
+        spinning=spinning + spin_innovation * dynamics.gain_deviation,
         time=time,
         noise=memory.noise + (squared - memory.noise) * share,
     )

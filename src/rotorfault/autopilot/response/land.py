@@ -51,7 +51,7 @@ from rotorfault.maths.scalar import (
     sqrt,
 )
 from rotorfault.model.block import Context, Record
-from rotorfault.model.signals import Diagnosis, Reference
+from rotorfault.model.signals import Diagnosis, Reference, Stuck
 from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
 
@@ -82,6 +82,7 @@ class LandMemory(NamedTuple):
     relief: Scalar  # 0 to 1
     loss: PerRotor  # believed last
     fault: PerRotor  # 1 where a fault was believed last
+    stuck: Stuck  # believed last
     still: Scalar  # s: for how long it has looked like standing on the ground
     down: Scalar  # 1 from the touch-down on
     p_W: Vec3  # m
@@ -136,22 +137,23 @@ class Land(Response[LandMemory, LandParameters]):
     def initial(self, inputs: ResponseInputs, parameters: LandParameters) -> LandMemory:
         """No fault seen yet."""
         none = PerRotor.all(0.0)
-        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, 0.0, 0.0, inputs.estimate.p_W, zeros(), 0.0)
+        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, Stuck(), 0.0, 0.0, inputs.estimate.p_W, zeros(), 0.0)
 
     def _believed(self, memory: LandMemory, diagnosis: Diagnosis) -> Diagnosis:
         """The last belief on the ground, or on what may be the ground; else the new one."""
         hold = greater(memory.relief, HOLD)
-        loss, flagged = select_record(hold, (memory.loss, memory.fault), (diagnosis.loss, diagnosis.flagged))
-        return diagnosis._replace(loss=loss, flagged=flagged)
+        before = (memory.loss, memory.fault, memory.stuck)
+        loss, flagged, stuck = select_record(hold, before, (diagnosis.loss, diagnosis.flagged, diagnosis.stuck))
+        return diagnosis._replace(loss=loss, flagged=flagged, stuck=stuck)
 
     def step(
         self, memory: LandMemory, inputs: ResponseInputs, parameters: LandParameters, dt: Scalar
     ) -> tuple[LandMemory, Decision, Record]:
         """One sampling instant."""
         diagnosis = self._believed(memory, inputs.diagnosis)
-        prediction = predict(inputs.expectation, diagnosis.loss, inputs.vehicle)
+        prediction = predict(inputs.expectation, diagnosis.loss, inputs.vehicle, diagnosis.stuck)
         unexplained = inputs.estimate.v_W.z - inputs.expectation.previous.v_W.z - prediction.delta_v_W.z
-        thrust_now = inputs.expectation.thrust.dot(1.0 - diagnosis.loss)
+        thrust_now = diagnosis.stuck.thrust_of(inputs.expectation.thrust, diagnosis.loss).sum()
         p, seen = parameters, inputs.estimate
         # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
         half = 0.5 * dt
@@ -193,7 +195,18 @@ class Land(Response[LandMemory, LandParameters]):
         )
         relief = select(down, 1.0, relief)
         after = LandMemory(
-            flagged, landing, lift, relief, diagnosis.loss, diagnosis.flagged, still, down, p_next_W, v_next_W, yaw
+            flagged,
+            landing,
+            lift,
+            relief,
+            diagnosis.loss,
+            diagnosis.flagged,
+            diagnosis.stuck,
+            still,
+            down,
+            p_next_W,
+            v_next_W,
+            yaw,
         )
         reference = select_record(landing, wanted, inputs.reference)
         return after, Decision(reference, diagnosis, landing + down, relief), LandTelemetry(lift, relief)

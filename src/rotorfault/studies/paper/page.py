@@ -14,6 +14,7 @@ from rotorfault.base.versions import versions
 from rotorfault.pages.style import environment
 from rotorfault.studies.paper import ablation, answer, figures, range_tables, ranges, sensitivity, table1
 from rotorfault.studies.paper.cases import main_runs
+from rotorfault.studies.paper.replays import Replay
 from rotorfault.studies.paper.verdicts import Claim
 from rotorfault.studies.runs import Result
 
@@ -33,6 +34,7 @@ class Page(NamedTuple):
     claims: list[Claim]
     quick: bool
     seconds: dict[str, float]
+    replays: list[Replay]  # pages of the cases
 
 
 def render(page: Page) -> str:
@@ -53,6 +55,7 @@ def render(page: Page) -> str:
         figures=drawn,
         extras={name: block[0] for name in EXTRA_CAPTIONS if (block := _figures(page, {name: EXTRA_CAPTIONS[name]}))},
         flights=_flights(page.results),
+        replays=page.replays,
         ablation=[] if page.quick else _rows(page.folder / "ablation.csv"),
         sensitivity=[] if page.quick else _rows(page.folder / "sensitivity.csv"),
         findings={}

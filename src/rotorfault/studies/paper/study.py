@@ -1,8 +1,8 @@
 """The whole paper by one call: fly what is missing, then figures, tables, claims and the report.
 
 Everything lands in one folder: ``report.html``, ``claims.json``, ``table1.csv``, ``ablation.csv``,
-``sensitivity.csv``, ``figures/``, ``flights/*.nc`` and ``runs/*.json``, the records by which a second start knows
-what is done.
+``sensitivity.csv``, ``figures/``, ``flights/*.nc``, a page per case in ``flights/*.html`` and ``runs/*.json``, the
+records by which a second start knows what is done.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rotorfault.studies.paper import ablation, claims, figures, sensitivity, tab
 from rotorfault.studies.paper.cases import CASES, CONTROLLERS, main_runs, matched_runs
 from rotorfault.studies.paper.measures import LABEL, measure
 from rotorfault.studies.paper.page import Page, render
+from rotorfault.studies.paper.replays import replays
 from rotorfault.studies.paper.verdicts import Claim, claims_json
 from rotorfault.studies.pool import fly_missing
 from rotorfault.studies.runs import Result, Run, RunStore
@@ -106,7 +107,10 @@ def reproduce(folder: Path, quick: bool = False, workers: int | None = None) -> 
     drawing.save(drawn, folder / "figures", ("png", "svg"))
     clock = timed("figures", clock)
 
-    page = Page(folder, results, verdicts, quick, seconds)
+    pages = replays(results, folder)
+    clock = timed("flight pages", clock)
+
+    page = Page(folder, results, verdicts, quick, seconds, pages)
     text = render(page)
     write_atomically(folder / "report.html", lambda temporary: temporary.write_text(text, encoding="utf-8"))
     timed("report", clock)

@@ -1,0 +1,40 @@
+"""What flew, from the records of a flight: its configuration, its vehicle, the settings of its parts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from rotorfault.model.vehicle_file import VehicleFile
+from rotorfault.results.flight_data import FlightData
+
+
+def configuration_of(data: FlightData) -> Mapping[str, Any]:
+    """The scenario as tables; empty where the records do not tell."""
+    try:
+        tables = json.loads(data.attrs.get("configuration", "{}"))
+    except (ValueError, TypeError):
+        return {}
+    return tables if isinstance(tables, dict) else {}
+
+
+def vehicle_file_of(data: FlightData) -> VehicleFile | None:
+    """The vehicle as believed, as its file has it; None where the records do not tell or it is no vehicle."""
+    try:
+        return VehicleFile.model_validate(configuration_of(data)["vehicle"])
+    except (KeyError, ValueError, TypeError):
+        return None
+
+
+def true_vehicle_file(data: FlightData) -> VehicleFile | None:
+    """The vehicle that flew: as believed, times the mismatch of what its rotors and its weight are."""
+    file = vehicle_file_of(data)
+    if file is None:
+        return None
+    mismatch = configuration_of(data).get("mismatch", {})
+    try:
+        factors = {key: float(mismatch[key]) for key in ("mass", "rotor_gain", "linear_drag") if key in mismatch}
+        return file.with_factors(factors)
+    except (ValueError, TypeError):
+        return None
