@@ -135,7 +135,7 @@ def _motors(data: FlightData) -> tuple[list[int], str]:
     """Which rotor is each motor, as indices, and what is said of it."""
     count = data["thrust_command"].values.shape[1] if "thrust_command" in data else 0
     airframe = airframe_of(data)
-    if airframe.count != count or not count:
+    if airframe.rotors != count or not count:
         return list(range(count)), "motor n is rotor n of the vehicle file"
     order, name = px4_order(airframe)
     if not name:
