@@ -73,6 +73,7 @@ LAZY = {
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
+    "rotorfault.report.film": {"imageio_ffmpeg": OPTIONAL},
     "rotorfault.results.exporters.mat": {"scipy.io": "takes longer to load than a flight to fly"},
     "rotorfault.results.exporters.mcap": {"mcap.writer": OPTIONAL},
     "rotorfault.results.exporters.parquet": {"pyarrow": "the same as scipy", "pyarrow.parquet": "the same"},
