@@ -171,12 +171,13 @@ def topic(ulog: Any, name: str, *fields: str) -> Values:
 
 def test_ulog_has_px4s_topics_in_px4s_frames(flight: rf.Flight, ulog: Any) -> None:
     flip = np.array([1.0, -1.0, -1.0])
-    place = topic(ulog, "vehicle_local_position", "x", "y", "z")
-    np.testing.assert_allclose(place, values_of(flight, "position") * flip, rtol=1e-6)
-    rates = topic(ulog, "vehicle_angular_velocity", "xyz[0]", "xyz[1]", "xyz[2]")
-    np.testing.assert_allclose(rates, values_of(flight, "body_rates") * flip, rtol=1e-6)
+    for ending, what in (("", "_estimated"), ("_groundtruth", "")):
+        place = topic(ulog, f"vehicle_local_position{ending}", "x", "y", "z")
+        np.testing.assert_allclose(place, values_of(flight, f"position{what}") * flip, rtol=1e-6)
+        rates = topic(ulog, f"vehicle_angular_velocity{ending}", "xyz[0]", "xyz[1]", "xyz[2]")
+        np.testing.assert_allclose(rates, values_of(flight, f"body_rates{what}") * flip, rtol=1e-6)
     # An arrow of the body is the same arrow of the world in both frames.
-    q = topic(ulog, "vehicle_attitude", *(f"q[{k}]" for k in range(4)))
+    q = topic(ulog, "vehicle_attitude_groundtruth", *(f"q[{k}]" for k in range(4)))
     theirs, ours = (Rotation.from_quat(each, scalar_first=True) for each in (q, values_of(flight, "quaternion")))
     arrow = np.array([0.3, -0.5, 0.8])
     np.testing.assert_allclose(theirs.apply(arrow * flip) * flip, ours.apply(arrow), atol=1e-6)
@@ -184,7 +185,8 @@ def test_ulog_has_px4s_topics_in_px4s_frames(flight: rf.Flight, ulog: Any) -> No
     angles = Rotation.from_quat(asked, scalar_first=True).as_euler("ZYX")[:, ::-1]
     np.testing.assert_allclose(angles, values_of(flight, "controller.attitude_command") * flip, atol=1e-6)
     thrust = topic(ulog, "vehicle_thrust_setpoint", "xyz[2]")
-    np.testing.assert_allclose(thrust, -values_of(flight, "thrust_demand"), rtol=1e-6)
+    most = 4.0 * flight.data.attrs["thrust_max"]
+    np.testing.assert_allclose(thrust, -values_of(flight, "thrust_demand") / most, rtol=1e-6)
     np.testing.assert_array_equal(
         ulog.get_dataset("vehicle_attitude").data["timestamp"], np.rint(flight.data.time * 1e6)
     )
@@ -243,6 +245,33 @@ def test_ulog_of_a_plus_frame_has_px4s_order_for_it(tmp_path: Path) -> None:
     assert "quadrotor +: motors 1 to 4 are rotors 3, 4, 1, 2" in log.msg_info_dict["rotorfault_motors"]
     motors = topic(log, "actuator_motors", *(f"control[{k}]" for k in range(4)))
     np.testing.assert_allclose(motors, values_of(flown, "thrust_command")[:, [2, 3, 0, 1]] / 8.68, rtol=1e-6)
+
+
+def test_ulog_says_what_px4_says_of_a_vehicle_and_its_failures(tmp_path: Path) -> None:
+    pyulog = pytest.importorskip("pyulog", reason="needs pyulog")
+    flown = rf.fly("paper-set-point", settings={"duration": 2.0})
+    log = pyulog.ULog(str(flown.export(tmp_path / "a.ulg")))
+    assert not log.file_corruption
+    known = log.initial_parameters
+    assert (known["MAV_TYPE"], known["CA_ROTOR_COUNT"]) == (2, 4)
+    # PX4's motor 1 of a quad + is on the right; ours there turns counter-clockwise.
+    assert [known[f"CA_ROTOR0_{name}"] for name in ("PX", "PY")] == pytest.approx([0.0, 0.42])
+    assert known["CA_ROTOR0_KM"] == pytest.approx(0.0382550)
+    assert known["CA_ROTOR2_KM"] == pytest.approx(-0.0382550)
+    status = log.get_dataset("failure_detector_status").data
+    # Rotors 1 and 3, front and right, are motors 3 and 1.
+    assert status["motor_failure_mask"][-1] == 0b101
+    flags = values_of(flown, "fault_flag") > 0.5
+    assert np.array_equal(status["motor_failure_mask"] & 1 > 0, flags[:, 2])
+    assert np.array_equal(status["fd_motor"] > 0, flags.any(axis=1))
+    whole = "".join(log.msg_info_multiple_dict["rotorfault_configuration"][0])
+    assert json.loads(whole) == json.loads(flown.data.attrs["configuration"])
+
+
+def test_events_are_those_of_all_records_however_few_are_written(flight: rf.Flight, tmp_path: Path) -> None:
+    few = messages(flight.export(tmp_path / "few.mcap", every=50))
+    wanted = [event.text for event in events(flight.records())]
+    assert [log["message"] for _, log in few["/events"]] == wanted
 
 
 READERS: dict[str, Callable[[Path], int]] = {

@@ -86,9 +86,13 @@ def write_columns(
 
     def write(file: IO[str]) -> None:
         table = csv.writer(file, lineterminator="\n")
+        plain = all(values.dtype.kind in "fiub" for values in columns.values())
         for start in range(0, len(next(iter(columns.values()))), BLOCK):
             block = [_texts(values[start : start + BLOCK]) for values in columns.values()]
-            table.writerows(zip(*block, strict=True))
+            if plain:  # nothing needs quotation marks, and to look for them takes long
+                file.writelines(f"{','.join(row)}\n" for row in zip(*block, strict=True))
+            else:
+                table.writerows(zip(*block, strict=True))
             done(start + len(block[0]))
 
     return _write(path, list(columns), write)
@@ -97,7 +101,10 @@ def write_columns(
 def _texts(values: NDArray[Any]) -> list[str]:
     if values.dtype.kind == "f":
         # Single precision becomes double here: its own digits alone would read back as another number.
-        return [_float(value) for value in values.astype(float).tolist()]
+        whole = values.astype(float)
+        if (whole == whole[0]).all() and (whole[0] != 0.0 or not np.signbit(whole).any()):
+            return [repr(float(whole[0]))] * len(whole)  # a flag, or what nothing changes
+        return list(map(_float if np.isnan(whole).any() else repr, whole.tolist()))
     return [cell(value) for value in values.tolist()]
 
 

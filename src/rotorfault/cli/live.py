@@ -214,7 +214,8 @@ class View:
 
 def _instant(data: FlightData, at: int) -> Instant:
     def value(name: str) -> Array:
-        return np.nan_to_num(np.asarray(data[name].values[at], dtype=float))
+        values: Array = np.nan_to_num(np.asarray(data[name].values[at], dtype=float))
+        return values
 
     return Instant(
         time=float(data["time"].values[at]),

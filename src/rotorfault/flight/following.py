@@ -66,6 +66,6 @@ class Following:
         signals = np.concatenate(pieces) if pieces else np.empty((0, len(self._layout)))
         signals = signals if records is None else signals[: max(records - self._shown, 0)]
         if len(signals):
-            times: Array = (self._shown + np.arange(len(signals))) * self._step
+            times: Array = np.arange(self._shown, self._shown + len(signals), dtype=np.float64) * self._step
             self._shown += len(signals)
             self._follow(flight_data(self._layout, signals, times, self._about))

@@ -70,7 +70,7 @@ class Animation:
         self.airframe = airframe_of(data)
         thrust = self._values("thrust")
         count = thrust.shape[1]
-        if self.airframe.count != count:  # nothing is known of where they are
+        if self.airframe.rotors != count:  # nothing is known of where they are
             self.airframe = self.airframe._replace(places=np.zeros((0, 3)), names=())
         most = self.airframe.thrust_max
         self._thrust, self._command = thrust / most, self._values("thrust_command") / most
@@ -80,7 +80,8 @@ class Animation:
         self._events = [event for event in events(data) if event.kind in (*TOLD, "end")]
         with rc_context(STYLE):
             self._figure = Figure(figsize=(INCHES, INCHES * SHAPE), dpi=width / INCHES)
-            self._canvas = FigureCanvasAgg(self._figure)
+            FigureCanvasAgg(self._figure)
+            self._canvas: Any = self._figure.canvas  # whose methods have no types
             self._moving: list[Artist] = []  # in every picture
             self._texts: list[Text] = []  # now and then
             self._written: tuple[tuple[str, str], ...] = ()
@@ -95,7 +96,8 @@ class Animation:
 
     def _values(self, name: str) -> Array:
         # A picture of what is not there is drawn where it was at rest: the end of a lost flight may have no numbers.
-        return np.nan_to_num(np.asarray(self._data[name].values, dtype=float), posinf=0.0, neginf=0.0)
+        values: Array = np.nan_to_num(np.asarray(self._data[name].values, dtype=float), posinf=0.0, neginf=0.0)
+        return values
 
     def picture(self, time: float) -> NDArray[np.uint8]:
         """The picture of a time.
@@ -117,11 +119,11 @@ class Animation:
             said = tuple((text.get_text(), str(text.get_color())) for text in self._texts)
             if said != self._written:
                 # Letters take most of the time, so those that stay for a while are drawn when they change.
-                self._canvas.restore_region(self._still)  # type: ignore[attr-defined]
+                self._canvas.restore_region(self._still)
                 for text in self._texts:
                     self._figure.draw_artist(text)
                 self._below, self._written = self._canvas.copy_from_bbox(self._figure.bbox), said
-            self._canvas.restore_region(self._below)  # type: ignore[attr-defined]
+            self._canvas.restore_region(self._below)
             for artist in self._moving:
                 self._figure.draw_artist(artist)
             return np.array(np.asarray(self._canvas.buffer_rgba())[:, :, :3])
@@ -264,7 +266,7 @@ class Animation:
             (self._target, wanted[None]),
         ):
             line.set_data(*CAMERA.seen(points).T)
-        look = self._thrust[at, : self.airframe.count], self._colour[at, : self.airframe.count]
+        look = self._thrust[at, : self.airframe.rotors], self._colour[at, : self.airframe.rotors]
         self._vehicle.show(CAMERA, place, turn, *look)
         self._large.show(CAMERA, np.zeros(3), turn, *look)
         self._move_rotors(at)
@@ -276,7 +278,8 @@ class Animation:
         self._done.set_data([self.time[0], moment.time], [0.5, 0.5])
 
     def _values_at(self, name: str, at: int) -> Array:
-        return np.nan_to_num(np.asarray(self._data[name].values[at], dtype=float))
+        values: Array = np.nan_to_num(np.asarray(self._data[name].values[at], dtype=float))
+        return values
 
     def _move_rotors(self, at: int) -> None:
         bars, marks = [], []
@@ -343,7 +346,8 @@ def _draw_floor(axes: Axes, low: Array, high: Array) -> Array:
 
     def word(place: Any, text: str) -> None:
         places.append(CAMERA.seen(np.array(place)))
-        axes.text(*places[-1], text, **style)
+        right, up = map(float, places[-1])
+        axes.text(right, up, text, **style)
 
     for x in ticks[0]:
         line(np.array((x, low[1], low[2])), np.array((x, high[1], low[2])))

@@ -117,7 +117,9 @@ class VehicleView:
             axes.add_artist(artist)
         # As marks: letters of a text would take longer than all else.
         style: Any = {"markersize": 6.5, "markeredgewidth": 0.0, "color": DARK, "linestyle": "", "zorder": 9}
-        self._numbers = [axes.plot([], [], marker=f"${k + 1}$", **style)[0] for k in range(airframe.count) if numbers]
+        self._numbers = [
+            axes.plot([], [], marker=f"${k + 1}$", **style)[0] for k in range(airframe.rotors) if numbers
+        ]
         self.artists += self._numbers
 
     def show(self, camera: Camera, place: Array, rotation: Array, thrust: Array, colours: Array) -> None:

@@ -44,14 +44,14 @@ class Airframe(NamedTuple):
     torque_ratio: float  # m
 
     @property
-    def count(self) -> int:
+    def rotors(self) -> int:
         """Number of rotors."""
         return len(self.places)
 
     @property
     def arm(self) -> float:
         """Distance in m of the outermost rotor from the centre of mass; 0.2 m without rotors."""
-        return float(np.linalg.norm(self.places, axis=1).max()) if self.count else 0.2
+        return float(np.linalg.norm(self.places, axis=1).max()) if self.rotors else 0.2
 
     @property
     def disc(self) -> float:
@@ -101,7 +101,7 @@ def px4_order(airframe: Airframe) -> tuple[NDArray[np.intp], str]:
     azimuth = np.degrees(np.arctan2(-y, x))  # clockwise from the front, seen from above
     best: tuple[float, str, NDArray[np.intp]] | None = None
     for name, wanted in PX4_ORDERS.items():
-        if len(wanted) != airframe.count:
+        if len(wanted) != airframe.rotors:
             continue
         off = np.abs((azimuth[None, :] - np.array(wanted)[:, None] + 180.0) % 360.0 - 180.0)
         order = off.argmin(axis=1)
@@ -109,4 +109,4 @@ def px4_order(airframe: Airframe) -> tuple[NDArray[np.intp], str]:
         # Within half of the angle between neighbours, or a rotor would stand at the place of two.
         if len(set(order.tolist())) == len(wanted) and worst < 180.0 / len(wanted) and (not best or worst < best[0]):
             best = worst, name, order
-    return (best[2], best[1]) if best else (np.arange(airframe.count), "")
+    return (best[2], best[1]) if best else (np.arange(airframe.rotors), "")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import in_folder, write_atomically
+from rotorfault.results.events import events
 from rotorfault.results.exporters import mat, mcap, parquet, rrd, table, ulog
 from rotorfault.results.exporters.table import every_nth
 from rotorfault.results.exporters.wanted import Wanted, Writer
@@ -52,7 +53,7 @@ def write(data: FlightData, path: Path, form: str | None = None, every: int = 1,
     writer = writer_of(form or form_of(path))
     some = every_nth(data, every)
     companions: list[Path] = []
-    wanted = Wanted(units, path, companions)
+    wanted = Wanted(units, path, companions, events(data))
     write_atomically(in_folder(path), lambda temporary: writer(some, temporary, wanted))
     return [path, *companions]
 

@@ -14,7 +14,6 @@ import numpy as np
 from rotorfault.base.errors import missing_extra
 from rotorfault.base.plain_text import one_line
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.results.events import events
 from rotorfault.results.exporters.wanted import Names, Wanted, signals, texts
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import vehicle_file_of
@@ -57,7 +56,7 @@ def write(data: FlightData, path: Path, wanted: Wanted) -> None:
         _vehicle(rr, stream, file)
         _thrusts(rr, stream, data, time, file)
     _signals(rr, stream, data, time)
-    for event in events(data):
+    for event in wanted.events:
         rr.set_time("time", duration=event.time, recording=stream)
         rr.log("events", rr.TextLog(event.text, level=LEVELS.get(event.kind, "INFO")), recording=stream)
     stream.flush()

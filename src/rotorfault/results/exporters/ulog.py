@@ -1,10 +1,11 @@
 """A flight as a PX4 log (ULog): PX4's own topics in PX4's frames, and all signals under names of rotorfault.
 
-Topics that PX4 has are named and filled as PX4 does, so Flight Review and PlotJuggler draw them as of any flight: the
-world is north, east, down with x taken for north, the body forward, right, down. Motors are in PX4's order where the
-vehicle is an X quadrotor, else in the order of its file; the message ``rotorfault_motors`` says which. All signals,
-in the frames of rotorfault, are in topics ``rotorfault_flight`` and ``rotorfault_SLOT``; their units are in the
-message ``rotorfault_signals``. Format: ULog version 1, as documented by PX4.
+Topics that PX4 has are named and filled as PX4 does, so Flight Review and PlotJuggler draw them as of any flight.
+What is estimated is in ``vehicle_attitude`` and its like, the truth in those with ``_groundtruth``. Their world is
+north, east, down with x taken for north, their body forward, right, down. Motors are in PX4's order where PX4 has an
+airframe with rotors at those places, else in the order of the vehicle's file; the message ``rotorfault_motors`` says
+which. All signals, in the frames of rotorfault, are in topics ``rotorfault_flight`` and ``rotorfault_SLOT``; their
+units are in the message ``rotorfault_signals``. Format: ULog version 1, as documented by PX4.
 """
 
 from __future__ import annotations
@@ -23,15 +24,17 @@ from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 from rotorfault.model.conventions import convert
 from rotorfault.results.airframe import airframe_of, px4_order
-from rotorfault.results.events import events
 from rotorfault.results.exporters.wanted import Names, Wanted, signals
 from rotorfault.results.flight_data import FlightData
 
 MAGIC = b"ULog\x01\x12\x35\x01"
 MOST_MOTORS = 12  # of PX4's actuator_motors
 MICRO = 1e6
+TYPES = {"float": "<f4", "double": "<f8", "uint16_t": "<u2"}
+MAV_TYPES = {3: 15, 4: 2, 6: 13, 8: 14}  # of MAVLink, by the number of rotors
 LEVELS = {"fault": 3, "false_alarm": 4, "alarm": 4, "given_up": 4}  # of a log: 3 error, 4 warning, else 6 information
 LONGEST = 2**16 - 64  # bytes of a message
+PIECE = 60_000  # bytes of a text in pieces
 
 
 class Topic(NamedTuple):
@@ -79,18 +82,21 @@ def write(data: FlightData, path: Path, wanted: Wanted) -> None:
         file.write(_message("B", bytes(40)))
         for key, text in information.items():
             file.write(_information(key, text))
+        for key, value in _parameters(data, motors).items():
+            file.write(_parameter(key, value))
+        file.write(_configuration(data))
         for topic in topics:
             file.write(_message("F", _format(topic).encode()))
         for number, topic in enumerate(topics):
             file.write(_message("A", struct.pack("<BH", 0, number) + topic.name.encode()))
         rows = _rows(time, topics)
         begun = 0
-        for event in events(data):
+        for event in wanted.events:
             until = int(np.searchsorted(time, event.time))
             file.write(rows[begun:until].tobytes())
             begun = until
             level, stamp = LEVELS.get(event.kind, 6), round(max(event.time, 0.0) * MICRO)
-            file.write(_message("L", struct.pack("<BQ", level + 48, stamp) + event.text.encode()[:2000]))
+            file.write(_message("L", struct.pack("<BQ", level + 48, stamp) + _cut(event.text, 2000)))
         file.write(rows[begun:].tobytes())
 
 
@@ -98,11 +104,49 @@ def _message(kind: str, body: bytes) -> bytes:
     return struct.pack("<HB", len(body), ord(kind)) + body
 
 
+def _cut(text: str, most: int) -> bytes:
+    """A text in no more bytes, no character of it in half."""
+    return text.encode()[:most].decode(errors="ignore").encode()
+
+
 def _information(key: str, text: str) -> bytes:
     """A message of information; a long text is cut, for a message has a length."""
-    value = text.encode()[: LONGEST - len(key)]
+    value = _cut(text, LONGEST - len(key))
     name = f"char[{len(value)}] {key}".encode()
     return _message("I", bytes([len(name)]) + name + value)
+
+
+def _parameter(key: str, value: float) -> bytes:
+    kind, form = ("int32_t", "<i") if isinstance(value, int) else ("float", "<f")
+    name = f"{kind} {key}".encode()
+    return _message("P", bytes([len(name)]) + name + struct.pack(form, value))
+
+
+def _parameters(data: FlightData, motors: list[int]) -> dict[str, float]:
+    """Parameters of PX4's that say where rotors are and how they turn, by the numbers of motors."""
+    frame = airframe_of(data)
+    if frame.rotors != len(motors) or not motors:
+        return {}
+    found: dict[str, float] = {"MAV_TYPE": MAV_TYPES.get(frame.rotors, 0), "CA_ROTOR_COUNT": frame.rotors}
+    for motor, rotor in enumerate(motors):
+        x, y, z = convert("position", frame.places[rotor], "rotorfault", "ned")
+        # Positive in PX4 for a rotor that turns counter-clockwise, whose drag turns the body to the right.
+        moment = -frame.torque_ratio * frame.yaw_signs[rotor]
+        found |= {f"CA_ROTOR{motor}_{name}": float(value) for name, value in zip(
+            ("PX", "PY", "PZ", "KM"), (x, y, z, moment), strict=True
+        )}  # fmt: skip
+    return found
+
+
+def _configuration(data: FlightData) -> bytes:
+    """The whole scenario as JSON, in as many pieces as it needs."""
+    text = str(data.attrs.get("configuration", "")).encode("ascii", "backslashreplace")
+    found = b""
+    for at in range(0, len(text), PIECE):
+        piece = text[at : at + PIECE]
+        name = f"char[{len(piece)}] rotorfault_configuration".encode()
+        found += _message("M", bytes([at > 0, len(name)]) + name + piece)
+    return found
 
 
 def _format(topic: Topic) -> str:
@@ -114,7 +158,7 @@ def _rows(time: Array, topics: list[Topic]) -> NDArray[np.void]:
     """All messages of data: for each record those of all topics, one behind the other."""
     columns: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = []
     for number, topic in enumerate(topics):
-        kind = {"float": "<f4", "double": "<f8"}[topic.type]
+        kind = TYPES[topic.type]
         columns += [
             (f"size{number}", "<u2"),
             (f"kind{number}", "u1"),
@@ -125,7 +169,7 @@ def _rows(time: Array, topics: list[Topic]) -> NDArray[np.void]:
     rows = np.zeros(len(time), dtype=np.dtype(columns))
     stamps = np.rint(time * MICRO).astype(np.uint64)
     for number, topic in enumerate(topics):
-        width = topic.values.shape[1] * {"float": 4, "double": 8}[topic.type]
+        width = topic.values.shape[1] * np.dtype(TYPES[topic.type]).itemsize
         rows[f"size{number}"], rows[f"kind{number}"], rows[f"id{number}"] = 2 + 8 + width, ord("D"), number
         rows[f"time{number}"], rows[f"values{number}"] = stamps, topic.values
     return rows
@@ -135,7 +179,7 @@ def _motors(data: FlightData) -> tuple[list[int], str]:
     """Which rotor is each motor, as indices, and what is said of it."""
     count = data["thrust_command"].values.shape[1] if "thrust_command" in data else 0
     airframe = airframe_of(data)
-    if airframe.count != count or not count:
+    if airframe.rotors != count or not count:
         return list(range(count)), "motor n is rotor n of the vehicle file"
     order, name = px4_order(airframe)
     if not name:
@@ -155,13 +199,20 @@ def _px4(data: FlightData, motors: list[int]) -> list[Topic]:
     def has(*names: str) -> bool:
         return all(name in data for name in names)
 
-    if has("quaternion"):
-        found.append(Topic("vehicle_attitude", (("q", 4),), of("quaternion", "quaternion")))
-    if has("position", "velocity"):
-        names = ("x", "y", "z", "vx", "vy", "vz", "heading")
-        yaw = -of("attitude")[:, 2:] if has("attitude") else np.full((len(data["time"].values), 1), np.nan)
-        values = np.hstack([of("position", "position"), of("velocity", "velocity"), yaw])
-        found.append(Topic("vehicle_local_position", tuple((name, 0) for name in names), values))
+    # As in a simulation of PX4's: what is estimated, and the truth beside it.
+    for what, ending in (("_estimated", ""), ("", "_groundtruth")):
+        position, velocity, attitude = f"position{what}", f"velocity{what}", f"attitude{what}"
+        if has(f"quaternion{what}"):
+            turned = of(f"quaternion{what}", "quaternion")
+            found.append(Topic(f"vehicle_attitude{ending}", (("q", 4),), turned))
+        if has(position, velocity):
+            names = ("x", "y", "z", "vx", "vy", "vz", "heading")
+            yaw = -of(attitude)[:, 2:] if has(attitude) else np.full((len(data["time"].values), 1), np.nan)
+            values = np.hstack([of(position, "position"), of(velocity, "velocity"), yaw])
+            found.append(Topic(f"vehicle_local_position{ending}", tuple((name, 0) for name in names), values))
+        if has(f"body_rates{what}"):
+            rates = of(f"body_rates{what}", "rates")
+            found.append(Topic(f"vehicle_angular_velocity{ending}", (("xyz", 3),), rates))
     if has("position_reference", "velocity_reference"):
         names = ("x", "y", "z", "vx", "vy", "vz", "yaw")
         yaw = (
@@ -169,15 +220,12 @@ def _px4(data: FlightData, motors: list[int]) -> list[Topic]:
         )
         values = np.hstack([of("position_reference", "position"), of("velocity_reference", "velocity"), yaw])
         found.append(Topic("vehicle_local_position_setpoint", tuple((name, 0) for name in names), values))
-    if has("body_rates"):
-        found.append(Topic("vehicle_angular_velocity", (("xyz", 3),), of("body_rates", "rates")))
     if has("controller.attitude_command"):
         angles = of("controller.attitude_command", "euler")
         found.append(Topic("vehicle_attitude_setpoint", (("q_d", 4),), _quaternions(angles)))
-    if has("torque_demand"):
-        found.append(Topic("vehicle_torque_setpoint", (("xyz", 3),), of("torque_demand", "rates")))
-    if has("thrust_demand"):
-        up = of("thrust_demand")
+    most = float(data.attrs.get("thrust_max", 0.0)) * len(motors)
+    if has("thrust_demand") and most > 0.0:
+        up = of("thrust_demand") / most  # PX4 has it as a share of the greatest
         found.append(Topic("vehicle_thrust_setpoint", (("xyz", 3),), np.column_stack([0 * up, 0 * up, -up])))
     if has("wind"):
         wind = of("wind", "velocity")
@@ -187,6 +235,11 @@ def _px4(data: FlightData, motors: list[int]) -> list[Topic]:
         used = motors[:MOST_MOTORS]
         shares[:, : len(used)] = of("thrust_command")[:, used] / float(data.attrs["thrust_max"])
         found.append(Topic("actuator_motors", (("control", MOST_MOTORS),), shares))
+        if has("fault_flag"):
+            mask = (of("fault_flag")[:, used] > 0.5) @ (1 << np.arange(len(used)))
+            fields = (("fd_motor", 0), ("motor_failure_mask", 0))
+            values = np.column_stack([mask > 0, mask])
+            found.append(Topic("failure_detector_status", fields, values, "uint16_t"))
     return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.results.events import Event
 from rotorfault.results.flight_data import FlightData
 
 
@@ -20,6 +21,7 @@ class Wanted(NamedTuple):
     units: bool  # whether names of columns end in their units, where the format is one table
     path: Path  # where the file will be, once it is whole
     companions: list[Path]  # files that come with it are added here
+    events: list[Event]  # of all records, however few of them are written
 
 
 Writer = Callable[[FlightData, Path, Wanted], object]
