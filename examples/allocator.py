@@ -31,7 +31,7 @@ class Boost(rf.Allocator[rf.Nothing, Numbers]):
         return Numbers(self.settings.least)
 
     def step(self, memory, inputs, numbers, dt):
-        wrench, diagnosis, vehicle, _ = inputs
+        wrench, diagnosis, vehicle, *_ = inputs
         boost = diagnosis.loss.map(lambda loss: 1.0 / maximum(1.0 - loss, numbers.least))
         thrust = nominal_inverse(vehicle, wrench)
         command = limited(vehicle, thrust.map(lambda f, b: f * b, boost) / vehicle.rotor_gain)
