@@ -162,15 +162,17 @@ def _numbers(now: Instant, signs: Signs) -> list[str]:
 
 def _rotors(flown: Flown, now: Instant, width: int, signs: Signs) -> list[str]:
     """A line for each rotor: thrust as a bar, the command as a mark in it, losses."""
+    wide = width >= NARROW
     found = []
     for k, thrust in enumerate(now.thrust):
-        words = f" true loss {100.0 * now.loss[k]:3.0f} %"
+        words = f" true loss {100.0 * now.loss[k]:3.0f} %" if wide else ""
         if now.flagged[k] > 0.5:
-            wrong = "FALSE ALARM" if now.loss[k] <= 0.0 else "FLAGGED"
-            words = f" {wrong}, believed {100.0 * now.believed[k]:3.0f} %,{words}"
+            flag = "FALSE ALARM" if now.loss[k] <= 0.0 else "FLAGGED"
+            believed = f"{100.0 * now.believed[k]:3.0f} %"
+            words = f" {flag}, believed {believed},{words}" if wide else f" {flag} {believed}"
         share, command = thrust / flown.thrust_max, now.command[k] / flown.thrust_max
         head = f"rotor {k + 1:<2}"
-        length = min(width - len(head) - 49, 40) if width >= NARROW else width - len(head) - 22
+        length = min(width - len(head) - 49, 40) if wide else width - len(head) - 26
         drawn = bar(share, length, signs, command)
         found.append(f"{head} {drawn} {100.0 * share:4.0f} %{words}")
     return found

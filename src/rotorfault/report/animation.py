@@ -7,7 +7,7 @@ milliseconds, where matplotlib's own axes in space would take a tenth of a secon
 from __future__ import annotations
 
 import json
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, cast, final
 
 import numpy as np
 from matplotlib import rc_context
@@ -80,8 +80,7 @@ class Animation:
         self._events = [event for event in events(data) if event.kind in (*TOLD, "end")]
         with rc_context(STYLE):
             self._figure = Figure(figsize=(INCHES, INCHES * SHAPE), dpi=width / INCHES)
-            FigureCanvasAgg(self._figure)
-            self._canvas: Any = self._figure.canvas  # whose methods have no types
+            self._canvas = cast("Any", FigureCanvasAgg(self._figure))  # its methods have no types
             self._moving: list[Artist] = []  # in every picture
             self._texts: list[Text] = []  # now and then
             self._written: tuple[tuple[str, str], ...] = ()
