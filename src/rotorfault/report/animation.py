@@ -27,6 +27,7 @@ from rotorfault.report.vehicle_view import CAMERA, VehicleView, rotations
 from rotorfault.results.airframe import airframe_of
 from rotorfault.results.events import events
 from rotorfault.results.flight_data import FlightData
+from rotorfault.results.text import FATES
 
 INCHES = 9.6  # width of the figure, whatever its pixels are: so letters grow with it
 SHAPE = 9.0 / 16.0  # height over width
@@ -34,7 +35,7 @@ TRAIL = 2.5  # s of the path that are drawn bold
 SAID = 4.0  # s for which an event stays in the picture, at real time
 LINES = 5  # of events at once
 SMALLEST = 0.085  # of the box: a smaller vehicle is drawn larger
-REACH = 4.0  # reference sizes that a path may leave the box by before the box stops growing
+REACH = 12.0  # reference sizes that a path may leave the box by before the box stops growing
 SERIOUS = ("fault", "false_alarm", "end")
 TOLD = ("fault", "alarm", "false_alarm", "cleared", "isolated", "switch", "touch_down")
 
@@ -170,7 +171,7 @@ class Animation:
         """The vehicle alone, as large as it fits."""
         axes = self._axes(0.63, 0.50, 0.355, 0.42)
         reach = self.airframe.arm + self.airframe.disc
-        self._show_all(axes, reach * np.array([(-1.05, -0.85), (1.05, 1.35)]))
+        self._show_all(axes, reach * np.array([(-1.2, -1.15), (1.2, 1.4)]))
         self._large = VehicleView(axes, self.airframe, 1.0, 3.2, numbers=True)
         self._moving += self._large.artists
         self._figure.text(0.645, 0.955, "thrusts, coloured by true loss", fontsize=9.0, va="center", color=BLACK)
@@ -215,7 +216,7 @@ class Animation:
         place: Any = {"fontsize": 9.0, "va": "center", "color": BLACK}
         self._numbers = self._figure.text(0.02, 0.088, "", **(place | {"color": GREY}))
         self._said = [self._figure.text(0.265, 0.166 - 0.0285 * k, "", **place) for k in range(LINES)]
-        self._fate = self._figure.text(0.315, 0.56, "", fontsize=20.0, ha="center", color=VERMILION, weight="bold")
+        self._fate = self._figure.text(0.47, 0.84, "", fontsize=17.0, ha="center", color=VERMILION, weight="bold")
         axes = self._figure.add_axes((0.02, 0.022, 0.965, 0.014))
         end = max(self._last, float(self.time[-1]), float(self.time[0]) + 1e-9)
         axes.set(xlim=(self.time[0], end), ylim=(0.0, 1.0), xticks=[], yticks=[], facecolor="0.92")
@@ -309,7 +310,7 @@ class Animation:
         ends = [event for event in self._events if event.kind == "end"]
         if not ends or moment.time < min(ends[0].time, float(self.time[-1])) - 1e-9 or self._survived:
             return ""
-        return shown(ends[0].text, 40)
+        return FATES.get(ends[0].text, shown(ends[0].text, 40))
 
     @property
     def _survived(self) -> bool:

@@ -144,9 +144,12 @@ def summary_text(summary: dict[str, Any]) -> str:
     return "\n".join([head, *(f"  {label.ljust(width)}  {text}" for label, text in lines)])
 
 
+FATES = {"tumbled": "tumbled", "diverged": "diverged", "ground": "hit the ground"}
+"""What became of a flight that was lost, by its outcome."""
+
+
 def _fate(summary: dict[str, Any]) -> str:
-    fates = {"tumbled": "tumbled", "diverged": "diverged", "ground": "hit the ground"}
-    return fates.get(summary["outcome"], "was interrupted")
+    return FATES.get(summary["outcome"], "was interrupted")
 
 
 UNTIL_LOST = "*"
