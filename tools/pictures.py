@@ -27,7 +27,7 @@ from PIL import Image
 
 import rotorfault as rf
 from rotorfault.model.conventions import CORNERS, ORDERS, layout
-from rotorfault.report.style import BLACK, BLUE, CM, GREY, STYLE, VERMILION
+from rotorfault.report.style import BLACK, BLUE, CM, STYLE, VERMILION
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 WIDTH = 16.0 * CM
@@ -220,68 +220,6 @@ def delays() -> Figure:
     return made
 
 
-# ----------------------------------------------------------------------------------------------------- the moving one
-
-
-def moving() -> bytes:
-    """The paper's first case as an animation: the vehicle from the side of its path, rotors by their thrust."""
-    data = rf.fly(CASE).data
-    times = np.concatenate([np.arange(0.0, 3.0, 0.05), np.full(8, 2.95)])
-    frames = [_frame(data, float(time)) for time in times]
-    palette = frames[-1].quantize(64, dither=Image.Dither.NONE)
-    small = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    out = io.BytesIO()
-    small[0].save(out, "GIF", save_all=True, append_images=small[1:], duration=70, loop=0, optimize=True)
-    return out.getvalue()
-
-
-def _frame(data, time: float) -> Image.Image:  # type: ignore[no-untyped-def]
-    made = Figure(figsize=(6.4, 4.0), dpi=100)
-    canvas = FigureCanvasAgg(made)
-    axes = made.add_axes((-0.06, -0.04, 0.70, 1.08), projection="3d")
-    now = data.sel(time=time, method="nearest")
-    before = data.sel(time=slice(0.0, time))
-    vehicle = rf.load_vehicle("paper").vehicle
-    turn = rf.Quat(*(float(x) for x in now["quaternion"])).matrix()
-    place = np.array(now["position"])
-    axes.plot(*np.array(before["position"]).T, color=GREY, linewidth=1.2)
-    axes.scatter(2.0, 2.0, 2.0, marker="+", color=BLACK, s=60)
-    angles = np.linspace(0.0, 2.0 * math.pi, 40)
-    names = ("front", "rear", "right", "left")
-    thrusts, limit = np.array(now["thrust"]), float(vehicle.thrust_max)
-    loss = np.array(now["loss_true"])
-    for k, (x, y) in enumerate(zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)):
-        tip = place + np.array(list(turn @ rf.Vec3(x, y, 0.0)))
-        ring = [
-            place + np.array(list(turn @ rf.Vec3(x + 0.2 * math.cos(a), y + 0.2 * math.sin(a), 0.0))) for a in angles
-        ]
-        colour = VERMILION if loss[k] else BLUE
-        axes.plot(*np.array([place, tip]).T, color="0.35", linewidth=2.0)
-        axes.plot(*np.array(ring).T, color=colour, linewidth=2.2)
-        pull = tip + np.array(list(turn @ rf.Vec3(0.0, 0.0, 0.8 * thrusts[k] / limit)))
-        axes.plot(*np.array([tip, pull]).T, color=colour, linewidth=2.2)
-    axes.set(xlim=(-0.3, 2.5), ylim=(-0.3, 2.5), zlim=(0.0, 2.8))
-    axes.set_xlabel("x (m)", fontsize=8, labelpad=-6)
-    axes.set_ylabel("y (m)", fontsize=8, labelpad=-6)
-    axes.set_zlabel("z (m)", fontsize=8, labelpad=-6)
-    axes.tick_params(labelsize=7, pad=-2)
-    axes.view_init(18, -60)
-    made.text(0.03, 0.93, f"t = {time:.2f} s", fontsize=12)
-    bars = made.add_axes((0.77, 0.16, 0.2, 0.66))
-    colours = [VERMILION if lost else BLUE for lost in loss]
-    bars.barh(range(4), thrusts, color=colours, height=0.55)
-    bars.set(xlim=(0, limit), ylim=(3.6, -0.6), yticks=range(4), xlabel="thrust (N)")
-    bars.set_yticklabels([f"{k + 1} {name}" for k, name in enumerate(names)], fontsize=8)
-    for k in range(4):
-        text = f"lost {loss[k]:.0%}" + (", flagged" if float(now["fault_flag"][k]) else "") if loss[k] else ""
-        bars.text(limit, k - 0.36, text, fontsize=7, color=VERMILION, ha="right", va="bottom")
-    bars.tick_params(labelsize=7)
-    for side in ("top", "right"):
-        bars.spines[side].set_visible(False)
-    canvas.draw()
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-
-
 def flight_page() -> bytes:
     """The page of the paper's first case, in a browser."""
     from playwright.sync_api import sync_playwright
@@ -311,7 +249,6 @@ PICTURES: dict[str, Callable[[], Figure | bytes]] = {
     "gallery-compare.png": compared,
     "gallery-attainable.png": attainable,
     "gallery-delay.png": delays,
-    "case1.gif": moving,
 }
 
 
