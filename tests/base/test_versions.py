@@ -16,7 +16,7 @@ from rotorfault.base.versions import FLIGHT, source_digest
 from rotorfault.campaigns.run import ROOMS
 
 # What may import a flight's rooms and is imported by them only to look at a flight that has been flown.
-AFTER_A_FLIGHT = {"analysis", "report"}
+AFTER_A_FLIGHT = {"analysis", "pages", "report"}
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_recovery_is_the_time_from_the_onset_until_the_error_stays_small(late: R
     at_once, later, latest, *never = (row["recovery_time"] for row in late)
     assert at_once == 0.0 < 1.0 < later < latest
     assert np.isnan(never).all()
-    assert [row["survived"] for row in late[3:]] == [True] * 4 + [False]
+    assert [row["survived"] for row in late[3:]] == [True] + [False] * 4
 
 
 def test_recovery_does_not_depend_on_what_is_recorded(late: Rows) -> None:
@@ -75,10 +75,10 @@ def test_recovery_does_not_depend_on_what_is_recorded(late: Rows) -> None:
 
 
 def test_grades_of_flights_that_end_differently(late: Rows) -> None:
-    assert [row["grade"] for row in late] == ["held"] + ["yaw given up"] * 3 + ["drifted"] * 3 + ["lost"]
-    assert [row["outcome"] for row in late] == ["settled"] * 3 + ["offset"] * 4 + ["tumbled"]
+    assert [row["grade"] for row in late] == ["held"] + ["yaw given up"] * 3 + ["lost"] * 4
+    assert [row["outcome"] for row in late] == ["settled"] * 3 + ["offset"] + ["tumbled"] * 4
     assert [row["success"] for row in late] == [True] * 4 + [False] * 4
-    assert [row["survived"] for row in late] == [True] * 7 + [False]
+    assert [row["survived"] for row in late] == [True] * 4 + [False] * 4
     assert late[0]["late_position_rms"] < HELD
     assert late[0]["late_yaw_rms"] < YAW < min(row["late_yaw_rms"] for row in late[1:4])
     assert HELD < late[3]["late_position_rms"] < BOUNDED

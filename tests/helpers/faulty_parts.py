@@ -172,8 +172,9 @@ class Feathers(rf.Controller[rf.Nothing, rf.Nothing]):
     """Half of the weight, whatever is measured."""
 
     def step(self, memory: rf.Nothing, inputs: rf.ControlInputs, parameters: rf.Nothing, dt: Scalar) -> Any:
-        lift = 0.5 * inputs.vehicle.mass * inputs.vehicle.gravity
-        return memory, rf.ControlOutput(rf.Wrench(lift, rf.Vec3(0.0, 0.0, 0.0))), rf.Nothing()
+        # Commands of the rotors, for allocation passes on what is no number of the body's spin.
+        each = 0.125 * inputs.vehicle.mass * inputs.vehicle.gravity
+        return memory, rf.ControlOutput(rf.PerRotor.all(each)), rf.Nothing()
 
 
 class Inner(rf.Settings):

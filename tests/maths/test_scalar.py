@@ -112,10 +112,12 @@ def function(name: str) -> Callable[..., Any]:
 
 
 def public_functions() -> set[str]:
+    """Functions of numbers; what tells a kind of number from another gives a truth value of Python."""
     return {
         name
         for name, thing in vars(scalar).items()
         if callable(thing) and getattr(thing, "__module__", "") == scalar.__name__ and not name.startswith("_")
+        if getattr(thing, "__annotations__", {}).get("return") != "bool"
     }
 
 

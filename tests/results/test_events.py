@@ -61,9 +61,9 @@ def test_a_limit_is_told_once_with_short_breaks_and_anew_after_long_ones() -> No
     command[700:750, 1] = 0.0
     data = made_up({"thrust_command": command}, {}, thrust_max=5.0, thrust_min=0.0)
     assert texts(data, "saturation") == [
-        "rotor 1 at its upper limit on and off for 200 ms",
-        "rotor 1 at its upper limit for 40 ms",
-        "rotor 2 at its lower limit for 50 ms",
+        "command of rotor 1 at its upper limit on and off for 200 ms",
+        "command of rotor 1 at its upper limit for 40 ms",
+        "command of rotor 2 at its lower limit for 50 ms",
     ]
 
 

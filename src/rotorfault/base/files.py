@@ -31,17 +31,28 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 
     Raises
     ------
+    InputError
+        If what stands there is no file: a folder, a device, a pipe.
     OSError
-        If the folder cannot be written; nothing is left behind.
+        If the folder cannot be written; nothing is left behind, and the error names the path that was given.
     """
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is {'a folder' if path.is_dir() else 'no regular file'}; give another file")
     # In a folder that only the user may enter, under a name that nobody can guess: whoever may write into the folder
     # of results cannot lay a link where the file will be written.
-    private = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name[:40]}."))
+    try:
+        private = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name[:40]}."))
+    except OSError as error:
+        raise type(error)(error.errno, error.strerror, str(path)) from None
     temporary = private / f"{secrets.token_hex(8)}{path.suffix}"
     try:
         write(temporary)
         _share(temporary)
         temporary.replace(path)
+    except OSError as error:
+        if error.errno is None or error.filename not in (None, str(temporary)):
+            raise
+        raise type(error)(error.errno, error.strerror, str(path)) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

@@ -146,6 +146,7 @@ def replay(
     """
     from rotorfault.base.files import output_folder
     from rotorfault.campaigns.api import Campaign, replay_changes
+    from rotorfault.campaigns.flight_set import flight_of
     from rotorfault.campaigns.replay import identifier_of
     from rotorfault.scenario.overrides import parse_overrides
 
@@ -162,6 +163,7 @@ def replay(
         flight = identifier_of(study, variant, cell, number)
     changes = replay_changes(controller, settings)
     changed = bool(changes) and campaign.is_changed(flight, changes)
+    flight_of(study, flight)  # refused before a folder is made for it
     target = out or folder.with_name(f"{folder.name}-replays") / (f"{flight}-changed" if changed else str(flight))
     output_folder(target)
     with warnings.catch_warnings():

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
+from rotorfault.base.bounds import require
 from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
@@ -135,6 +136,7 @@ class Flight:
         """
         from rotorfault.pages.flight_page import write_page
 
+        require(path, (str, Path), "path", "the path of a page")
         return write_page([self.shown(self.label)], Path(path))
 
     def shown(self, label: str) -> Shown:
@@ -233,6 +235,7 @@ class Flight:
         MissingExtraError
             If the library of the format is not there.
         """
+        require(path, (str, Path), "path", "the path of a file")
         return exporters.write(self.records(), Path(path), to, every, units)[0]
 
     def records(self) -> FlightData:

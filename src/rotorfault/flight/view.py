@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from rotorfault.base.bounds import require
 from rotorfault.flight.given import Given, labelled
 from rotorfault.pages.flight_page import MOST, write_page
 
@@ -32,5 +33,6 @@ def view(*flights: Given | Sequence[Given] | Mapping[str, Given], out: str | Pat
     InputError
         If they are no flights, too many, one has no records, a file cannot be read, or the folder does not exist.
     """
+    require(out, (str, Path), "out", "the path of a page")
     labels = labelled("view", flights, 1, MOST)
     return write_page([flight.shown(label) for label, flight in labels.items()], Path(out))

@@ -60,6 +60,8 @@ def write_page(flights: Sequence[Shown], path: Path) -> Path:
     InputError
         If there are none or too many, one has no records, or the folder does not exist.
     """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path}: a page is a file that ends in .html; give such a name")
     html = page(flights)
     write_atomically(in_folder(path), lambda temporary: temporary.write_text(html, encoding="utf-8"))
     return path
@@ -72,6 +74,8 @@ def page(flights: Sequence[Shown]) -> str:
     for flight in flights:
         if not len(flight.data["time"].values):
             raise InputError(f"{one_line(flight.label)}: has no records; nothing to show")
+    vehicles = {_short(flight.data.attrs.get("vehicle", "")) for flight in flights}
+    flights = [flight._replace(label=_label(flight, len(vehicles) > 1)) for flight in flights]
     folder = resources.files("rotorfault.pages")
     names = " and ".join(dict.fromkeys(_short(flight.data.attrs.get("scenario", "flight")) for flight in flights))
     made = environment()
@@ -79,13 +83,19 @@ def page(flights: Sequence[Shown]) -> str:
     return made.from_string((folder / "flight.html.j2").read_text(encoding="utf-8")).render(
         title=f"{names} · rotorfault",
         heading=names,
-        flights=[{"label": _short(flight.label), "facts": headline(flight.data)} for flight in flights],
+        flights=[{"label": flight.label, "facts": headline(flight.data)} for flight in flights],
         records=[_provenance(flight) for flight in flights],
         thinned=_thinned(payload),
         data=script_data(payload),
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
         program=Markup((folder / "bundle" / "flight.js").read_text(encoding="utf-8")),
     )  # fmt: skip
+
+
+def _label(flight: Shown, with_vehicle: bool) -> str:
+    """What a flight is called: with its vehicle, where the page has several."""
+    vehicle = _short(flight.data.attrs.get("vehicle", "")) if with_vehicle else ""
+    return _short(", ".join(filter(None, (flight.label, vehicle))))
 
 
 def _payload(flights: Sequence[Shown]) -> dict[str, Any]:

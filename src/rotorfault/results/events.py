@@ -225,7 +225,7 @@ def _saturation(data: FlightData, time: Array) -> Iterator[Event]:
         for side, limit, sign in ends:
             spans = _spans(time, sign * (command[:, k] - limit) >= -AT_LIMIT)
             for span, more in _first(spans):
-                text = f"rotor {k + 1} at its {side} limit {_span_text(span)}{more}"
+                text = f"command of rotor {k + 1} at its {side} limit {_span_text(span)}{more}"
                 yield Event(span.start, "saturation", text, k + 1, span.end)
 
 

@@ -135,7 +135,9 @@ def summary_text(summary: dict[str, Any]) -> str:
     by = summary["controller"] + (f" ({summary['preset']})" if summary.get("preset") else "")
     # Names may come from a file: none may look like a line of ours.
     head = one_line(f"{summary['scenario']} flown by {by} on {summary['plant']} ({summary['engine']} engine)")
-    if not summary["survived"]:
+    if summary["outcome"] == "interrupted":
+        head += f"\n  interrupted: the numbers are those of the {number(summary['end_time'], 's')} that were flown"
+    elif not summary["survived"]:
         head += (
             f"\n  lost: the numbers are those of the {number(summary['end_time'], 's')} before it {_fate(summary)}"
         )

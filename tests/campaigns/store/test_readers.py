@@ -57,7 +57,7 @@ SNIPPETS = re.findall(r"^```python\n(.*?)^```", DOC.read_text(encoding="utf-8"),
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a real campaign, where the documentation looks for one."""
     folder = tmp_path_factory.mktemp("flown")
-    rotorfault.campaign(TINY, folder / "campaigns" / "partial-loss-map")
+    rotorfault.campaign(TINY, folder / "campaigns" / "my-map")
     return folder
 
 

@@ -21,7 +21,7 @@ from rotorfault.plant.wind import PaperWind
 from rotorfault.report import figures as report
 from rotorfault.report import style
 from rotorfault.report.bars import Column, error_figure
-from rotorfault.report.path_figure import _once
+from rotorfault.report.path_figure import once
 from rotorfault.report.rotor_layout import layout_figure
 from rotorfault.results.flight_data import FORMAT
 from rotorfault.studies import runs
@@ -228,7 +228,7 @@ def test_the_layout_of_any_vehicle(name: str) -> None:
 def test_a_path_flown_twice_is_dashed_once() -> None:
     phase = np.arange(0.0, 40.0, 0.01)
     circle = np.column_stack([np.cos(phase), np.sin(phase), 0.0 * phase])
-    drawn_once = np.isfinite(_once(circle)[:, 0])
+    drawn_once = np.isfinite(once(circle)[:, 0])
     assert drawn_once[phase < 6.2].all()
     assert drawn_once[phase > 6.4].mean() < 0.02
 

@@ -5,6 +5,7 @@ Rerun's world is told that it is right-handed with z up, as ours is. The timelin
 
 from __future__ import annotations
 
+import errno
 import uuid
 from pathlib import Path
 from typing import Any
@@ -59,8 +60,11 @@ def write(data: FlightData, path: Path, wanted: Wanted) -> None:
     for event in wanted.events:
         rr.set_time("time", duration=event.time, recording=stream)
         rr.log("events", rr.TextLog(event.text, level=LEVELS.get(event.kind, "INFO")), recording=stream)
-    stream.flush()
-    stream.disconnect()
+    try:
+        stream.flush()
+        stream.disconnect()
+    except RuntimeError as error:  # its writer says no more than that it ended: a full disk, most of all
+        raise OSError(errno.EIO, "could not be written whole; see that there is room", str(wanted.path)) from error
 
 
 def _blueprint(data: FlightData) -> Any:

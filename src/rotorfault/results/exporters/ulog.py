@@ -24,6 +24,7 @@ from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 from rotorfault.model.conventions import convert
 from rotorfault.results.airframe import airframe_of, px4_order
+from rotorfault.results.events import Event
 from rotorfault.results.exporters.wanted import Names, Wanted, signals
 from rotorfault.results.flight_data import FlightData
 
@@ -96,8 +97,15 @@ def write(data: FlightData, path: Path, wanted: Wanted) -> None:
             file.write(rows[begun:until].tobytes())
             begun = until
             level, stamp = LEVELS.get(event.kind, 6), round(max(event.time, 0.0) * MICRO)
-            file.write(_message("L", struct.pack("<BQ", level + 48, stamp) + _cut(event.text, 2000)))
+            file.write(_message("L", struct.pack("<BQ", level + 48, stamp) + _cut(_told(event, motors), 2000)))
         file.write(rows[begun:].tobytes())
+
+
+def _told(event: Event, motors: list[int]) -> str:
+    """An event in words; topics count motors, so where a rotor has another number there, both are said."""
+    if event.rotor - 1 not in motors or motors[event.rotor - 1] == event.rotor - 1:
+        return event.text
+    return f"{event.text} (rotor {event.rotor} is motor {motors.index(event.rotor - 1) + 1})"
 
 
 def _message(kind: str, body: bytes) -> bytes:
