@@ -72,7 +72,7 @@ export class Clock {
 
   setSpeed(speed) {
     if (!(speed > 0)) return;
-    this.speed = speed;
+    this.speed = Math.min(Math.max(speed, SPEEDS[0]), SPEEDS[SPEEDS.length - 1]);
     this.changed();
   }
 
