@@ -17,8 +17,8 @@ import xarray as xr
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.report.style import COLOURS, LINES, shown, unit
+from rotorfault.results.flown import vehicle_file_of
 from rotorfault.results.outcome import Outcome
 
 WIDE, THIN, ALONE = 1.5, 0.9, 1.1  # line widths in points: first and last of several flights, a single one
@@ -68,11 +68,8 @@ class Drawn(NamedTuple):
     @property
     def vehicle(self) -> Vehicle | None:
         """The vehicle that flew, in numbers; None where the records do not tell."""
-        try:
-            configuration = json.loads(self.data.attrs.get("configuration", "{}"))
-            return VehicleFile.model_validate(configuration["vehicle"]).vehicle
-        except (KeyError, ValueError):
-            return None
+        file = vehicle_file_of(self.data)
+        return None if file is None else file.vehicle
 
     def shows(self, signal: str, column: int | None = None) -> bool:
         """Whether there is a finite value of a signal, or of one column of it."""

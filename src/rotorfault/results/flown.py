@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.results.flight_data import FlightData
 
 
-def configuration_of(data: FlightData) -> Mapping[str, Any]:
+class Records(Protocol):
+    """Records of a flight with its attributes: `FlightData`, or an xarray dataset."""
+
+    @property
+    def attrs(self) -> dict[Any, Any]:
+        """Attributes of the flight as a whole."""
+
+
+def configuration_of(data: Records) -> Mapping[str, Any]:
     """The scenario as tables; empty where the records do not tell."""
     try:
         tables = json.loads(data.attrs.get("configuration", "{}"))
@@ -19,7 +26,7 @@ def configuration_of(data: FlightData) -> Mapping[str, Any]:
     return tables if isinstance(tables, dict) else {}
 
 
-def vehicle_file_of(data: FlightData) -> VehicleFile | None:
+def vehicle_file_of(data: Records) -> VehicleFile | None:
     """The vehicle as believed, as its file has it; None where the records do not tell or it is no vehicle."""
     try:
         return VehicleFile.model_validate(configuration_of(data)["vehicle"])
@@ -27,7 +34,7 @@ def vehicle_file_of(data: FlightData) -> VehicleFile | None:
         return None
 
 
-def true_vehicle_file(data: FlightData) -> VehicleFile | None:
+def true_vehicle_file(data: Records) -> VehicleFile | None:
     """The vehicle that flew: as believed, times the mismatch of what its rotors and its weight are."""
     file = vehicle_file_of(data)
     if file is None:
