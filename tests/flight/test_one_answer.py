@@ -212,7 +212,7 @@ def test_an_interrupted_flight_says_so_too(monkeypatch: pytest.MonkeyPatch, tmp_
     assert summary["survived"] is False
     assert [hit["rotor"] for hit in summary["detections"]] == [2]
     assert summary["late_position_rms"] is None
-    assert "before it was interrupted" in str(summary)
+    assert "interrupted: the numbers are those of the 2.5 s that were flown" in str(summary)
     monkeypatch.undo()
     # All of its figures are drawn, and one of them written: writing is what takes time.
     assert set(figures.draw(flight.data)) > {"path", "position"}

@@ -138,9 +138,8 @@ def summary_text(summary: dict[str, Any]) -> str:
     if summary["outcome"] == "interrupted":
         head += f"\n  interrupted: the numbers are those of the {number(summary['end_time'], 's')} that were flown"
     elif not summary["survived"]:
-        head += (
-            f"\n  lost: the numbers are those of the {number(summary['end_time'], 's')} before it {_fate(summary)}"
-        )
+        flown, fate = number(summary["end_time"], "s"), FATES[summary["outcome"]]
+        head += f"\n  lost: the numbers are those of the {flown} before it {fate}"
     lines = rows(summary)
     width = max(len(label) for label, _ in lines)
     return "\n".join([head, *(f"  {label.ljust(width)}  {text}" for label, text in lines)])
@@ -148,10 +147,6 @@ def summary_text(summary: dict[str, Any]) -> str:
 
 FATES = {"tumbled": "tumbled", "diverged": "diverged", "ground": "hit the ground"}
 """What became of a flight that was lost, by its outcome."""
-
-
-def _fate(summary: dict[str, Any]) -> str:
-    return FATES.get(summary["outcome"], "was interrupted")
 
 
 UNTIL_LOST = "*"
