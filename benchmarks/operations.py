@@ -9,15 +9,20 @@ two versions can be compared to the last operation where a stopwatch sees noise.
 
 The second table changes one part of the quiet loop at a time for another of its kind, and says what that saves; less
 than 0 is more. Parts share terms, so these do not add up to the whole.
+
+The last line is what the compiler made of the quiet loop for this processor: instructions of a step for as many
+flights as a register has lanes, and how many of them only keep a number on the stack or fetch it from there.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 from collections import Counter
 from typing import Any
 
 import rotorfault as rf
+from rotorfault.engine import native
 from rotorfault.engine.program import program, same_for_all, trace
 from rotorfault.flight.assembly import assemble
 
@@ -27,6 +32,7 @@ LEAST = {
     "controller sdre": {"controller": {"kind": "sdre", "preset": "none"}},
     "wind none": {"wind": {"kind": "none"}},
 }
+ON_STACK = re.compile(r"\((?:%rsp|%rbp|sp)\)")
 LANES = 4  # of the program that is counted; the count does not depend on it
 
 
@@ -36,6 +42,20 @@ def operations(scenario: rf.Scenario, with_signals: bool) -> Counter[str]:
     counts = program(trace(batch, same_for_all(batch)), LANES, with_signals).operations
     del counts["none"]  # names of places in memory, and of the same number in all lanes
     return counts
+
+
+def instructions(scenario: rf.Scenario) -> str:
+    """How many instructions of this processor a step of the quiet loop takes."""
+    batch = assemble(scenario)
+    text = program(trace(batch, same_for_all(batch)), native.lanes(), with_signals=False).text
+    step = native.assembly_of(text).partition("\nfly:")[2].splitlines()
+    found = [line.partition("#")[0].strip() for line in step if line.startswith("\t") and not line.startswith("\t.")]
+    stack = [line for line in found if ON_STACK.search(line)]
+    stored = sum(line.endswith(")") for line in stack)
+    return (
+        f"{len(found):,d} instructions a step for {native.lanes()} flights; "
+        f"{stored} keep a number on the stack, {len(stack) - stored} fetch one"
+    )
 
 
 def loaded(name: str, settings: dict[str, Any]) -> rf.Scenario:
@@ -59,6 +79,7 @@ def main() -> None:
     for name, change in LEAST.items():
         saved = whole - operations(loaded(chosen.scenario, settings | change), False).total()
         print(f"{saved:6,d}  {name}")
+    print(f"\n{instructions(scenario)}")
 
 
 if __name__ == "__main__":

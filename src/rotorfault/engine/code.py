@@ -10,6 +10,10 @@ import struct
 from collections import Counter
 from collections.abc import Iterable
 
+NEVER = "%never"
+"""A condition that never holds, which the compiler does not know; of functions with blocks."""
+READING = ("load", "getelementptr", "insertelement", "shufflevector")
+
 
 class Code:
     """Straight-line code. Values are names; an instruction written twice is one.
@@ -28,15 +32,27 @@ class Code:
         self.lines: list[str] = []
         self.counts: Counter[str] = Counter()
         self._names: dict[str, str] = {}
+        self._written = 0
 
     def value(self, instruction: str, sort: str | None = None) -> str:
         """The name of what an instruction gives."""
         name = self._names.get(instruction)
         if name is None:
-            name = self._names[instruction] = f"%{self._prefix}{len(self._names)}"
+            name = self._names[instruction] = f"%{self._prefix}{self._written}"
+            self._written += 1
             self.lines.append(f"  {name} = {instruction}")
             self.counts[sort or instruction.partition(" ")[0]] += 1
         return name
+
+    def begin_block(self) -> None:
+        """Begin a block, in which what was read from memory before is read again.
+
+        Between the blocks is a way out that is never taken (`NEVER`): the compiler would join them otherwise.
+        """
+        label = f"{self._prefix}b{self._written}"
+        self._written += 1
+        self.lines += [f"  br i1 {NEVER}, label %done, label %{label}", f"{label}:"]
+        self._names = {i: name for i, name in self._names.items() if not i.startswith(READING)}
 
     def constant(self, number: float) -> str:
         """A number in all lanes."""
@@ -93,20 +109,21 @@ class Code:
         of = self.vector if kind == "number" else self.mask
         return self.value(f"select {self.mask} {mask}, {of} {a}, {of} {b}")
 
-    def minimum(self, a: str, b: str) -> str:
-        """The smaller; NaN if either is."""
-        return self._extreme("olt", a, b)
+    def minimum(self, a: str, b: str, is_number: bool = False) -> str:
+        """The smaller; NaN if either is. Of a it may be known that it is a number."""
+        return self._extreme("olt", a, b, is_number)
 
-    def maximum(self, a: str, b: str) -> str:
-        """The larger; NaN if either is."""
-        return self._extreme("ogt", a, b)
+    def maximum(self, a: str, b: str, is_number: bool = False) -> str:
+        """The larger; NaN if either is. Of a it may be known that it is a number."""
+        return self._extreme("ogt", a, b, is_number)
 
-    def _extreme(self, predicate: str, a: str, b: str) -> str:
-        # One instruction, which gives b where either is NaN: a number can be no NaN, and so stands first.
+    def _extreme(self, predicate: str, a: str, b: str, is_number: bool) -> str:
+        # One instruction, which gives b where either is NaN: what can be no NaN stands first.
         if b.startswith("splat"):
             a, b = b, a
         taken = self.select(self.compare(predicate, a, b), a, b)
-        return taken if a.startswith("splat") else self.select(self.compare("uno", a, a), a, taken)
+        known = is_number or a.startswith("splat")
+        return taken if known else self.select(self.compare("uno", a, a), a, taken)
 
     def integer_op(self, name: str, a: str, b: str) -> str:
         """add, sub, and, or, xor, shl, lshr, ashr."""

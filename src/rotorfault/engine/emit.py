@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
@@ -21,6 +22,11 @@ _FUNCTIONS: dict[str, Callable[..., str]] = {
     "exp": elementary.exponential,
     "tanh": elementary.hyperbolic_tangent,
 }
+
+
+# Terms of a block. With half or twice as many the paper's loop takes 1 % more instructions of the machine, and with
+# one block for all 8 % (benchmarks/operations.py).
+BLOCK = 200
 
 
 class Leaf(NamedTuple):
@@ -75,13 +81,46 @@ class Emitter:
         self.code, self._leaves, self._computed, self._merging = code, leaves, computed, merging
         self._numbers: dict[int, str] = {}
         self._masks: dict[int, str] = {}
+        self._read: set[int] = set()
 
-    def write_all(self, outputs: Iterable[Term]) -> None:
-        """Write all that some outputs need, in the order in which it was traced.
+    def store_all(self, writes: Sequence[tuple[str, int, Term]]) -> None:
+        """Write all that some outputs need, in the order in which it was traced, and store them.
 
         What an equation needs was mostly computed just before it, so that fewer values wait in memory for their use
-        than in an order found output by output.
+        than in an order found output by output. An output that takes the place of a number of the state is stored
+        once nothing reads that number any more. And what was read is read again in the next block, where it may take
+        part in an operation as it lies in memory: kept in between, it would be written and read elsewhere.
+
+        Parameters
+        ----------
+        writes : sequence of (str, int, Term)
+            Pointer, row and value of each output. What lies at ``%state`` is read as leaf ('state', row).
         """
+        if not writes:
+            return
+        tape = writes[0][2].tape
+        needed = [
+            index for index in self._all_needed(term for _, _, term in writes) if self._computes(tape.terms[index])
+        ]
+        at = self._when_stored(writes, [tape.terms[index] for index in needed])
+        for count, index in enumerate(needed, start=1):
+            self._write(tape.terms[index])
+            for write in at.pop(index, ()):
+                self._store(*write)
+            if count % BLOCK == 0:
+                self.code.begin_block()
+                for read in self._read:
+                    del self._numbers[read]
+                self._read.clear()
+        rest = [(pointer, row, self.number(term)) for late in at.values() for pointer, row, term in late]
+        for pointer, row, name in rest:
+            self.code.store(name, pointer, row * self.code.lanes)
+
+    def _store(self, pointer: str, row: int, term: Term) -> None:
+        self.code.store(self.number(term), pointer, row * self.code.lanes)
+
+    def _all_needed(self, outputs: Iterable[Term]) -> list[int]:
+        """Indices of all terms that some outputs need, in order."""
         needed: set[int] = set()
         todo = list(outputs)
         while todo:
@@ -90,13 +129,31 @@ class Emitter:
                 continue
             needed.add(term.index)
             if term.index not in self._computed:
-                todo += [a for a in self._needed(term) if isinstance(a, Term)]
-        tape = next(iter(outputs)).tape if needed else None
-        for index in sorted(needed):
-            assert tape is not None
-            term = tape.terms[index]
-            if isinstance(term.args[0], Term) and index not in self._computed:
-                self._write(term)
+                todo += self._needed(term)
+        return sorted(needed)
+
+    def _computes(self, term: Term) -> bool:
+        """Whether a term takes an operation, and is not read."""
+        return term.op != "const" and isinstance(term.args[0], Term) and term.index not in self._computed
+
+    def _when_stored(
+        self, writes: Iterable[tuple[str, int, Term]], terms: Iterable[Term]
+    ) -> dict[float, list[tuple[str, int, Term]]]:
+        """What is stored after which term, by its index; infinite for what is stored last of all."""
+        last_read: dict[int, float] = {}
+        for term in terms:
+            for arg in self._needed(term):
+                if arg.op == "state":
+                    last_read[arg.args[0]] = term.index
+        for _, _, term in writes:
+            if term.op == "state":
+                last_read[term.args[0]] = math.inf
+        at: dict[float, list[tuple[str, int, Term]]] = {}
+        for pointer, row, term in writes:
+            read = last_read.get(row, -1) if pointer == "%state" else -1
+            when = max(term.index, read) if self._computes(term) else math.inf
+            at.setdefault(when, []).append((pointer, row, term))
+        return at
 
     def number(self, term: Term) -> str:
         """The name of a term's value."""
@@ -128,8 +185,10 @@ class Emitter:
                 continue
             if term.index in self._computed:
                 self._numbers[term.index] = self._leaf("par", self._computed[term.index])
+                self._read.add(term.index)
             elif not isinstance(term.args[0], Term):
                 self._numbers[term.index] = self._leaf(term.op, term.args[0])
+                self._read.add(term.index)
             else:
                 missing = [a for a in self._needed(term) if not self._there(a)]
                 if missing:
@@ -180,6 +239,11 @@ class Emitter:
             seed, index, step = (self._number(a) for a in args[:3])
             width, word, number = args[3:]
             return normal(code, seed, index, step, Stream(width, word), number)
+        if op in ("min", "max"):
+            # Parameters are numbers: what is not is refused before the flight.
+            a, b = sorted(args, key=lambda arg: arg.level)
+            extreme = code.minimum if op == "min" else code.maximum
+            return extreme(self._number(a), self._number(b), is_number=a.level < 2)
         numbers = [self._number(a) for a in args]
         if op == "mul":
             return code.op("fmul", *numbers)
@@ -188,8 +252,7 @@ class Emitter:
                 return code.op("fmul", numbers[0], code.op("fdiv", code.constant(1.0), numbers[1]))
             return code.op("fdiv", *numbers)
         simple: dict[str, Callable[..., str]] = {
-            "neg": code.negative, "sqrt": code.square_root, "abs": code.magnitude, "min": code.minimum,
-            "max": code.maximum, "round": code.nearest,
+            "neg": code.negative, "sqrt": code.square_root, "abs": code.magnitude, "round": code.nearest,
         }  # fmt: skip
         return simple[op](*numbers) if op in simple else _FUNCTIONS[op](code, *numbers)
 

@@ -38,10 +38,18 @@ def _machine() -> Any:
 
 def compile_text(text: str) -> bytes:
     """Object code of a module."""
-    machine = _machine()
-    module = llvm.parse_assembly(f'target triple = "{machine.triple}"\n{text}')
+    return bytes(_machine().emit_object(_module(text)))
+
+
+def assembly_of(text: str) -> str:
+    """What `compile_text` makes of a module, to be read."""
+    return str(_machine().emit_assembly(_module(text)))
+
+
+def _module(text: str) -> Any:
+    module = llvm.parse_assembly(f'target triple = "{_machine().triple}"\n{text}')
     module.verify()
-    return bytes(machine.emit_object(module))
+    return module
 
 
 class Native:

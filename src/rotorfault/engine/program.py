@@ -256,10 +256,7 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
             before.store(emitter.number(term), "%out", (prepared + row) * lanes)
         code = Code(lanes, f"s{number}v")
         emitter = Emitter(code, leaves, {term.index: prepared + row for row, term in enumerate(fixed)}, merged)
-        emitter.write_all([term for _, _, term in writes])
-        named = [(pointer, row, emitter.number(term)) for pointer, row, term in writes]
-        for pointer, row, name in named:  # last of all: nothing of the step may read what it writes
-            code.store(name, pointer, row * lanes)
+        emitter.store_all(writes)
         pieces.append(code)
         prepared += len(fixed)
 
@@ -269,7 +266,7 @@ def program(traced: Traced, lanes: int, with_signals: bool) -> Program:
         declarations="\n".join(declarations(lanes)),
         prepare=over_groups("prepare", "par", layout.parameters * lanes, prepared * lanes, before.lines),
         step=_body(pieces, traced.substeps),
-        latch="step" if len(pieces) == 1 else "moved",
+        latch="moved",
         prepared=prepared * lanes,
         state=layout.state * lanes,
         out=layout.signals * lanes if with_signals else 0,
@@ -290,16 +287,20 @@ def _stays(pointer: str, row: int, term: Term) -> bool:
 
 def _body(pieces: list[Code], substeps: int) -> str:
     if len(pieces) == 1:
-        return "\n".join(pieces[0].lines)
+        return "\n".join([*pieces[0].lines, "  br label %moved", "moved:"])
     instant, move = pieces
     return "\n".join(
         [
             *instant.lines,
+            "  br label %told",
+            "told:",
             "  br label %move",
             "move:",
-            "  %m = phi i64 [ 0, %step ], [ %m1, %move ]",
+            "  %m = phi i64 [ 0, %told ], [ %m1, %again ]",
             "  %count = sitofp i64 %m to double",
             *move.lines,
+            "  br label %again",
+            "again:",
             "  %m1 = add i64 %m, 1",
             f"  %onward = icmp slt i64 %m1, {substeps}",
             "  br i1 %onward, label %move, label %moved",
@@ -332,6 +333,7 @@ _MODULE = """
 define void @fly(ptr noalias %state0, ptr noalias readonly %par0, ptr noalias readonly %shared0,
                  ptr noalias %out0, i64 %groups, i64 %steps) {{
 entry:
+  %never = icmp slt i64 %groups, 0
   %kept = alloca [{kept} x double], align 64
   br label %each
 each:
@@ -351,8 +353,8 @@ step:
   %shared = getelementptr inbounds double, ptr %shared0, i64 %shared_at
 {step}
   %k1 = add i64 %k, 1
-  %again = icmp slt i64 %k1, %steps
-  br i1 %again, label %step, label %next
+  %goes_on = icmp slt i64 %k1, %steps
+  br i1 %goes_on, label %step, label %next
 next:
   %g1 = add i64 %g, 1
   %more = icmp slt i64 %g1, %groups

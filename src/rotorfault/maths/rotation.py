@@ -8,6 +8,8 @@ world; this file is the only place that knows the order. Euler angles are (roll,
 
 from __future__ import annotations
 
+import math
+
 from rotorfault.maths.geometry import Mat3, Value, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, atan2, cos, less, select, sin, sqrt
 
@@ -161,15 +163,31 @@ class OfAngles(Quat):
         """Rotation matrix R_WB."""
         return super().matrix() if self.angles is None else euler_matrix(self.angles)
 
+    def heading(self) -> Scalar:
+        """Yaw in rad, which may count on beyond a turn: where the body x axis points, seen from above."""
+        if self.angles is None:
+            return super().heading()
+        # Upside down it points the other way.
+        turned = select(less(_turns(self.angles)[0].y, 0.0), math.pi, 0.0)
+        heading: Scalar = self.angles.z + turned
+        return heading
+
     def z_axis(self) -> Vec3:
         """The body z axis in world coordinates."""
         return super().z_axis() if self.angles is None else body_z_axis(self.angles)
 
 
+def _turns(euler: Vec3) -> tuple[Vec3, Vec3]:
+    """Cosines and sines of angles, from those of their halves: a quaternion needs these, and so they serve both."""
+    half = euler * 0.5
+    c, s = half.map(cos), half.map(sin)
+    sines: Vec3 = c.times(s) * 2.0
+    return Vec3(*(1.0 - 2.0 * (x * x) for x in s)), sines
+
+
 def euler_matrix(euler: Vec3) -> Mat3:
     """Rotation matrix R_WB = Rz(yaw) Ry(pitch) Rx(roll) of Euler angles in rad."""
-    c_roll, c_pitch, c_yaw = euler.map(cos)
-    s_roll, s_pitch, s_yaw = euler.map(sin)
+    (c_roll, c_pitch, c_yaw), (s_roll, s_pitch, s_yaw) = _turns(euler)
     return Mat3(
         c_yaw * c_pitch, c_yaw * s_pitch * s_roll - s_yaw * c_roll, c_yaw * s_pitch * c_roll + s_yaw * s_roll,
         s_yaw * c_pitch, s_yaw * s_pitch * s_roll + c_yaw * c_roll, s_yaw * s_pitch * c_roll - c_yaw * s_roll,
@@ -179,8 +197,7 @@ def euler_matrix(euler: Vec3) -> Mat3:
 
 def body_z_axis(euler: Vec3) -> Vec3:
     """The thrust axis R_WB e_z in world coordinates: the third column of `euler_matrix`, as in (3)."""
-    c_roll, c_pitch, c_yaw = euler.map(cos)
-    s_roll, s_pitch, s_yaw = euler.map(sin)
+    (c_roll, c_pitch, c_yaw), (s_roll, s_pitch, s_yaw) = _turns(euler)
     return Vec3(
         c_yaw * s_pitch * c_roll + s_yaw * s_roll,
         s_yaw * s_pitch * c_roll - c_yaw * s_roll,

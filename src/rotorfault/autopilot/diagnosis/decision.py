@@ -21,9 +21,10 @@ below ``clear_threshold`` for ``clear_persistence``; the time counts as far as i
 :math:`\min(F_i/F_{hover}, 1)^2`.
 
 **Belief.** :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i -
-threshold`, which is 0 in steady hover. The believed loss follows it with the time constant ``smoothing`` as far as
-it lies outside of that margin, and within it more slowly, by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too
-much is flagged with a loss of 0: no reallocation makes it give less.
+threshold`, which is 0 in steady hover, and not at all where a sound rotor would give less than 5 % of F_max. The
+believed loss follows it with the time constant ``smoothing`` as far as it lies outside of that margin, and within it
+more slowly, by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too much is flagged with a loss of 0: no
+reallocation makes it give less.
 
 **Test.** A rotor that is believed to have lost more than half may be held where it cannot show that it is sound. So
 it is tested, at once and every ``test_interval``: it gets ``test_thrust`` at least, for as long as lag and observer
@@ -63,6 +64,7 @@ from rotorfault.model.vehicle import Vehicle, hover_thrust
 # Of F_max: below it a thrust is no measure for a loss. Our choice: an error of 1 % of F_max then reads as a loss of
 # 0.2 at most.
 SMALL_THRUST = 0.05
+UNBOUNDED = 2.0  # margin of a loss, which lies between 0 and 1
 TESTED = 0.5  # believed loss above which a rotor is tested: more of it has gone than is left
 
 
@@ -187,12 +189,17 @@ def relative_loss(residual: PerRotor, thrust: PerRotor, vehicle: Vehicle) -> Per
     vehicle : Vehicle
         As believed.
     """
-    return _loss(second_best(residual), residual, thrust, vehicle)
+    return _loss(second_best(residual), residual, _per_thrust(thrust, vehicle))
 
 
-def _loss(sound: Scalar, residual: PerRotor, thrust: PerRotor, vehicle: Vehicle) -> PerRotor:
+def _loss(sound: Scalar, residual: PerRotor, per_thrust: PerRotor) -> PerRotor:
+    return residual.map(lambda r, over: clip((sound - r) * over, 0.0, 1.0), per_thrust)
+
+
+def _per_thrust(thrust: PerRotor, vehicle: Vehicle) -> PerRotor:
+    """One over the thrusts in 1/N; over a small one where there is less."""
     least = SMALL_THRUST * vehicle.thrust_max
-    return residual.map(lambda r, f: clip((sound - r) / maximum(f, least), 0.0, 1.0), thrust)
+    return thrust.map(lambda f: 1.0 / maximum(f, least))
 
 
 def decide(
@@ -208,7 +215,7 @@ def decide(
         As believed.
     parameters : DecisionParameters
     dt : scalar, s
-        Time since the last instant.
+        Sampling period. Before the first instant nothing is suspected, so it does not matter that none has passed.
 
     Returns
     -------
@@ -218,9 +225,9 @@ def decide(
         In N, of what is missing.
     """
     p, sound = parameters, second_best(evidence.residual)
-    losses = _loss(sound, evidence.residual, evidence.thrust, vehicle)
-    hover = hover_thrust(vehicle).r1
-    nothing = 1e-9 * hover
+    per_thrust = _per_thrust(evidence.thrust, vehicle)
+    losses = _loss(sound, evidence.residual, per_thrust)
+    hover, least = hover_thrust(vehicle).r1, SMALL_THRUST * vehicle.thrust_max
     noise = p.noise * evidence.noise
     excess = evidence.residual.reduce(maximum) - sound
     # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
@@ -234,6 +241,7 @@ def decide(
         partner: Scalar,
         at_fault: Scalar,
         f: Scalar,
+        over_f: Scalar,
         any_: Scalar,
         beside: Scalar,
         was: DecisionMemory,
@@ -255,8 +263,8 @@ def decide(
         cleared = both(greater_equal(below, p.clear_persistence - half), negated(raised))
         flagged = select(raised, 1.0, select(cleared, 0.0, was.flagged))
 
-        # Beyond all bounds where there is no thrust: what shows nothing changes nothing.
-        margin = maximum(threshold / maximum(f, nothing) - p.threshold, 0.0)
+        # Beyond all bounds where there is too little thrust: what shows nothing changes nothing.
+        margin = select(less(f, least), UNBOUNDED, maximum(threshold * over_f - p.threshold, 0.0))
         gap = loss - was.smoothed
         open_ = clip(gap, -margin, margin)
         # Between suspicion and flag the filter runs already, from the loss seen at the first suspicion.
@@ -277,7 +285,7 @@ def decide(
         return from_pairs(vehicle, PerRotor(r2, r1, r4, r3))
 
     partners, at_fault = opposite(evidence.residual), opposite(memory.flagged)
-    known = (evidence.residual, partners, at_fault, evidence.thrust, *evidence.model_error)
+    known = (evidence.residual, partners, at_fault, evidence.thrust, per_thrust, *evidence.model_error)
     rows = zip(losses, *known, before, strict=True)
     columns = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
     threshold, test, since, below, flagged, smoothed, tested = columns

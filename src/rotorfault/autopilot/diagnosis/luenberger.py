@@ -220,7 +220,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             misstated(wrong, memory.decision.flagged, parameters.decision.model, vehicle),
             noise_of(wrong, vehicle, dynamics),
         )
-        decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, elapsed)
+        decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, dt)
         after = LuenbergerMemory(
             climb=climb + dynamics.gain_rate * innovation_z,
             omega_B=omega_B + innovation * dynamics.gain_rate,

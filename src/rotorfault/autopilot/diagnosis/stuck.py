@@ -93,7 +93,7 @@ def judged(
         Thrust of a rotor in hover.
     parameters : StuckParameters
     dt : scalar, s
-        Since the last instant.
+        Sampling period.
     """
     still = memory.judged.map(both, seen.flagged)
     kept = still.reduce(either)
