@@ -23,7 +23,7 @@ from scipy.stats import chi2
 
 import rotorfault as rf
 from rotorfault.maths.arrays import Array
-from rotorfault.model.vehicle import hover_thrust
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.scenario import scenario_from
 

@@ -16,8 +16,9 @@ from rotorfault.autopilot.prediction import Prediction
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.block import Context
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Estimate, Reference, Wrench, healthy
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]

@@ -9,8 +9,9 @@ from plant_flights import MODELS, T, array, fly, held_by, numbers_of, part, plan
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.block import Context, Nothing
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Command
-from rotorfault.model.vehicle import gyroscopic_torque, hover_thrust
+from rotorfault.model.vehicle import gyroscopic_torque
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULT, GROUND, PLANT, SENSORS, WIND
 

@@ -36,6 +36,7 @@ LAZY = {
         "rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load",
         "rotorfault.campaigns.report.kept": "brings what makes pages, which a campaign does not need",
     },
+    "rotorfault.model.vehicle_file": {"scipy.optimize": "is needed for frames without opposite pairs alone"},
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
     "rotorfault.base.frames": {
         "pandas": "need not be there, and takes long to load",

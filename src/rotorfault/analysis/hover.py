@@ -14,6 +14,8 @@ along an axis tilted into the wind. In the sums and differences of the rotor pai
 - *yaw held*: f_12 = f_34 besides, the thrust is anything in [4 max(a, c), 4 min(b, d)];
 - *spinning*: no balance at all, sum lo_i to sum hi_i.
 
+For frames without opposite pairs the same is found by active sets (`rotorfault.analysis.any_frame`).
+
 What the three mean. *Held* is rest with all torques in balance. *Given up* is balance of force and tilt torque: the
 thrust axis can stand still while the body turns about it, which costs no tilt torque at any rate; the yaw torque
 that is left over (`yaw_torque`) spins the body up, in this model without end, in air until its drag balances that.
@@ -32,6 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorfault.analysis import any_frame
 from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
@@ -98,7 +101,6 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
     Parameters
     ----------
     vehicle : Vehicle
-        Two opposite pairs of rotors.
     loss : PerRotor
         Of each rotor, 0 to 1; scalars, or arrays for many cases at once.
     wind_W : Vec3, m/s, world frame, optional
@@ -111,8 +113,11 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
         carries the vehicle away), and is 0 where the wind carries more than the weight: that takes flight upside
         down.
     """
-    low, high = (in_pairs(vehicle, ends) for ends in _thrust_ranges(vehicle, loss))
+    ranges = _thrust_ranges(vehicle, loss)
     needed, upright = _needed(vehicle, wind_W)
+    if vehicle.pairs == ():
+        return _any_margin(vehicle, any_frame.frame_of(vehicle, *ranges, 1.0 - loss, needed), upright)
+    low, high = (in_pairs(vehicle, ends) for ends in ranges)
     room = _room(vehicle)
     a, b = maximum(low.r1, low.r2), minimum(high.r1, high.r2)
     c, d = maximum(low.r3, low.r4), minimum(high.r3, high.r4)
@@ -145,6 +150,31 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
     )
 
 
+def _any_margin(vehicle: Vehicle, frame: any_frame.Frame, upright: Scalar) -> HoverMargin:
+    """The same for a frame without opposite pairs."""
+    found, needed = any_frame.reach(frame), frame.needed
+    spinning = frame.limits.high.sum()
+    room = any_frame.BALANCED * vehicle.rotor_gain * vehicle.thrust_max
+
+    def possible(least: Scalar, most: Scalar) -> Scalar:
+        return both(upright, both(less_equal(least, needed + room), less_equal(needed, most + room)))
+
+    without_yaw = possible(found.least_without_yaw, found.most_without_yaw)
+    return HoverMargin(
+        needed=needed,
+        thrust_with_yaw=found.most_with_yaw,
+        thrust_without_yaw=found.most_without_yaw,
+        thrust_spinning=spinning,
+        margin_with_yaw=(found.most_with_yaw - needed) / vehicle.mass,
+        margin_without_yaw=(found.most_without_yaw - needed) / vehicle.mass,
+        margin_spinning=(spinning - needed) / vehicle.mass,
+        with_yaw=possible(found.least_with_yaw, found.most_with_yaw),
+        without_yaw=without_yaw,
+        spinning=both(upright, less_equal(needed, spinning + room)),
+        yaw_torque=select(without_yaw, found.yaw_torque, NAN),
+    )
+
+
 def critical_loss(
     vehicle: Vehicle, rotor: int, yaw: bool = True, wind_W: Vec3 | None = None, loss: PerRotor | None = None
 ) -> Scalar:
@@ -160,9 +190,8 @@ def critical_loss(
     Parameters
     ----------
     vehicle : Vehicle
-        Two opposite pairs of rotors.
     rotor : int
-        1 to 4.
+        From 1.
     yaw : bool
         Whether yaw is to be held; else roll and pitch alone.
     wind_W : Vec3, m/s, world frame, optional
@@ -180,9 +209,14 @@ def critical_loss(
     InputError
         If there is no such rotor.
     """
-    own = _index(rotor)
-    low, high = _thrust_ranges(vehicle, PerRotor.all(0.0) if loss is None else loss)
+    own, loss = _index(rotor, vehicle), PerRotor.all(0.0, vehicle.rotors) if loss is None else loss
     needed, upright = _needed(vehicle, wind_W)
+    if vehicle.pairs == ():
+        others = PerRotor.of(0.0 if k == own else x for k, x in enumerate(loss))
+        frame = any_frame.frame_of(vehicle, *_thrust_ranges(vehicle, others), 1.0 - others, needed)
+        left = any_frame.least_thrust(frame, own, yaw) / (vehicle.rotor_gain * vehicle.thrust_max)
+        return select(upright, clip(1.0 - left, 0.0, 1.0), NAN)
+    low, high = _thrust_ranges(vehicle, loss)
     room = _room(vehicle)
     partner_low, c = _beside(vehicle, own, low, maximum)
     partner_high, d = _beside(vehicle, own, high, minimum)
@@ -208,7 +242,7 @@ def critical_pair(
     vehicle, yaw, wind_W
         As for `critical_loss`.
     rotor_a, rotor_b : int
-        1 to 4, not the same.
+        From 1, not the same.
     losses_a : array_like
         Losses of rotor a, 0 to 1.
 
@@ -222,10 +256,10 @@ def critical_pair(
     InputError
         If there is no such rotor, or it is the same one twice.
     """
-    if _index(rotor_a) == _index(rotor_b):
-        raise InputError(f"rotor_b: got {rotor_b}, which is rotor_a; allowed: another one of 1 to 4")
+    if _index(rotor_a, vehicle) == _index(rotor_b, vehicle):
+        raise InputError(f"rotor_b: got {rotor_b}, which is rotor_a; allowed: another one of 1 to {vehicle.rotors}")
     losses = np.asarray(losses_a, dtype=float)
-    loss = PerRotor.of(losses if i == rotor_a else np.zeros_like(losses) for i in (1, 2, 3, 4))
+    loss = PerRotor.of(losses if i == rotor_a else np.zeros_like(losses) for i in _numbers(vehicle))
     return np.asarray(critical_loss(vehicle, rotor_b, yaw, wind_W, loss), dtype=float)
 
 
@@ -254,8 +288,12 @@ def torque_reserve(vehicle: Vehicle, loss: PerRotor, yaw: bool = True, wind_W: V
     Vec3, N m, body axes
         The torques about the other axes are 0. Without yaw z is 0. All 0 where hover is not possible.
     """
-    low, high = (in_pairs(vehicle, ends) for ends in _thrust_ranges(vehicle, loss))
+    ranges = _thrust_ranges(vehicle, loss)
     needed, upright = _needed(vehicle, wind_W)
+    if vehicle.pairs == ():
+        reserve = any_frame.reserve(any_frame.frame_of(vehicle, *ranges, 1.0 - loss, needed), yaw)
+        return Vec3(*(upright * torque for torque in reserve))
+    low, high = (in_pairs(vehicle, ends) for ends in ranges)
     x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)
     y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
     det = x1 * y3 - x3 * y1
@@ -277,7 +315,6 @@ def attainable(vehicle: Vehicle, loss: PerRotor | None = None) -> Attainable:
     Parameters
     ----------
     vehicle : Vehicle
-        Two opposite pairs of rotors.
     loss : PerRotor, optional
         Of each rotor, 0 to 1; all sound if not given.
 
@@ -285,9 +322,10 @@ def attainable(vehicle: Vehicle, loss: PerRotor | None = None) -> Attainable:
     -------
     Attainable
     """
-    loss = PerRotor.all(0.0) if loss is None else loss
+    loss = PerRotor.all(0.0, vehicle.rotors) if loss is None else loss
     with_yaw, without_yaw = (
-        PerRotor.of(critical_loss(vehicle, rotor, yaw, loss=loss) for rotor in (1, 2, 3, 4)) for yaw in (True, False)
+        PerRotor.of(critical_loss(vehicle, rotor, yaw, loss=loss) for rotor in _numbers(vehicle))
+        for yaw in (True, False)
     )
     return Attainable(
         loss=loss,
@@ -323,7 +361,8 @@ def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
         kinds.append((name, "yes" if possible else "no", _thrust(most), torque))
     enough = "enough thrust on average, which is all that is known" if m.spinning else "-"
     kinds.append(("spinning", "perhaps" if m.spinning else "no", _thrust(m.thrust_spinning), enough))
-    critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", "1", "2", "3", "4")]
+    numbers = [str(number) for number in _numbers(vehicle)]
+    critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", *numbers)]
     for name, losses in (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw)):
         critical.append((name, *("none" if math.isnan(x) else f"{x:.4f}" for x in losses)))
     turn = f"which turns the body faster by {m.yaw_torque / vehicle.inertia.z:.3g} rad/s^2"
@@ -332,7 +371,7 @@ def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
         f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
         *table_lines(kinds, "<<><", indent=2),
         *(left_over if m.without_yaw and not m.with_yaw else []),
-        *table_lines(critical, "<>>>>", indent=2),
+        *table_lines(critical, "<" + ">" * len(numbers), indent=2),
     ]
 
 
@@ -367,6 +406,8 @@ def _thrust_ranges(vehicle: Vehicle, loss: PerRotor) -> tuple[PerRotor, PerRotor
     """Least and largest thrust of each rotor in N."""
     require(vehicle, Vehicle, "vehicle", "a Vehicle, such as load_vehicle(...).vehicle")
     require(loss, PerRotor, "loss", "a PerRotor, such as PerRotor(0.4, 0, 0, 0)")
+    if len(loss) != vehicle.rotors:
+        raise InputError(f"loss: got {len(loss)} numbers; allowed: one for each of the {vehicle.rotors} rotors")
     effect = loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
     return effect * vehicle.thrust_min, effect * vehicle.thrust_max
 
@@ -391,9 +432,13 @@ def _room(vehicle: Vehicle) -> Scalar:
     return TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
 
 
-def _index(rotor: int) -> int:
+def _index(rotor: int, vehicle: Vehicle) -> int:
     """Place of a rotor in the vehicle, from 0."""
-    return whole_number(rotor, "rotor", 1, 4) - 1
+    return whole_number(rotor, "rotor", 1, vehicle.rotors) - 1
+
+
+def _numbers(vehicle: Vehicle) -> range:
+    return range(1, vehicle.rotors + 1)
 
 
 def _thrust(most: float) -> str:

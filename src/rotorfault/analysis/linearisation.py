@@ -219,7 +219,7 @@ def calm(
         elif slot.many:
             parts[slot] = ()
             numbers.append(())
-    still = ClosedLoop(parts, loop.plant.substeps)
+    still = ClosedLoop(parts, loop.plant.substeps, rotors=loop.rotors)
     return still, parameters._replace(period=period, parts=still.record(*numbers))
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from rotorfault.base.config import Strict
 from rotorfault.maths.arrays import ANGLES, Array
 from rotorfault.maths.geometry import Vec3
-from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_check import most_torque
 
 JUMPS = "discontinuous"  # what a setting says whose law jumps

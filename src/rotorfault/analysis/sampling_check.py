@@ -29,8 +29,9 @@ from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.block import Context
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Estimate, Reference, at_rest, healthy
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.reference import REFERENCE
 from rotorfault.scenario.scenario import Scenario
 
@@ -111,7 +112,7 @@ def reported_gains(
 
     def first_step(seen: Estimate) -> tuple[ControlOutput, Any]:
         numbers = controller.parameters(Context(vehicle, period))
-        sound, hover = healthy(), hover_thrust(vehicle)
+        sound, hover = healthy(vehicle.rotors), hover_thrust(vehicle)
         inputs = ControlInputs(
             estimate=seen,
             reference=reference,

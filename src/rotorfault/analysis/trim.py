@@ -112,7 +112,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
     Parameters
     ----------
     vehicle : Vehicle
-        Sound rotors, two opposite pairs.
+        Sound rotors.
     wind_W : Vec3, m/s, optional
         Velocity of the air over ground; its drag k_d wind is held by tilting into it.
     """
@@ -127,7 +127,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         rotor_speed=rotor_speeds(vehicle, thrust),
         attitude=attitude_for(force_W, 1.0, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
-        thrust_margin=4.0 * k * vehicle.thrust_max / needed,
+        thrust_margin=vehicle.rotors * k * vehicle.thrust_max / needed,
         torque_max=Vec3.of(most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
     )
 
@@ -158,7 +158,7 @@ def hover_loop(
         elif slot.side != "task" and name:
             kind = slot.registry[name]
             parts[slot] = kind(kind.Settings())
-    loop = ClosedLoop(parts, substeps_of(period))
+    loop = ClosedLoop(parts, substeps_of(period), rotors=vehicle.rotors)
     return loop, LoopParameters(vehicle, vehicle, loop.numbers(vehicle, vehicle, period), period)
 
 
@@ -280,7 +280,9 @@ def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list
 
 def _hover_lines(report: TrimReport) -> list[str]:
     v, h = report.numbers, report.hover
-    speed, limits = h.rotor_speed.r1, f"{v.thrust_min:g} to {v.thrust_max:g} N"
+    limits = f"{v.thrust_min:g} to {v.thrust_max:g} N"
+    thrust, command = _span(h.thrust, 1.0), _span(h.command, 1.0)
+    speed, rpm = _span(h.rotor_speed, 1.0), _span(h.rotor_speed, 30.0 / math.pi)
     torque = ", ".join(f"{t:.3g}" for t in h.torque_max)
     turn = ", ".join(f"{t:.4g}" for t in h.torque_max.over(v.inertia))
     return [
@@ -289,8 +291,8 @@ def _hover_lines(report: TrimReport) -> list[str]:
         "Hover",
         *table_lines(
             [
-                ("thrust of a rotor", f"{h.thrust.r1:.4g} N (command {h.command.r1:.4g} of {limits})"),
-                ("speed of a rotor", f"{speed:.4g} rad/s ({speed * 30.0 / math.pi:.0f} rpm)"),
+                ("thrust of a rotor", f"{thrust} N (command {command} of {limits})"),
+                ("speed of a rotor", f"{speed} rad/s ({rpm} rpm)"),
                 ("thrust to weight", f"{h.thrust_margin:.3g}"),
                 ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
                 ("rotor lag", f"{v.rotor_bandwidth:g} rad/s"),
@@ -299,6 +301,12 @@ def _hover_lines(report: TrimReport) -> list[str]:
             indent=2,
         ),
     ]
+
+
+def _span(values: PerRotor, factor: float) -> str:
+    """One number, or the least and the largest of several."""
+    low, high = f"{min(values) * factor:.4g}", f"{max(values) * factor:.4g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _pole_lines(report: TrimReport) -> list[str]:

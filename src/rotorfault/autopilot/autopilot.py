@@ -19,10 +19,11 @@ from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, Record
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Allocation, Command, Readings, Reference, Wrench, healthy, motion_of
 from rotorfault.model.slot import Slot
 from rotorfault.model.telemetry import example
-from rotorfault.model.vehicle import Vehicle, hover_thrust, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rotor_speeds
 
 AnyBlock = Block[Any, Any, Any, Any]
 
@@ -88,12 +89,12 @@ class Autopilot:
         past = Past(rotors, (), Command(held, zeros()), 0.0, rotor_speeds(vehicle, expected_thrust(rotors, vehicle)))
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
-        wrench = Wrench(hover.sum(), zeros())
+        wrench, sound = Wrench(hover.sum(), zeros()), healthy(vehicle.rotors)
         instant.outputs = {
-            "diagnosis": healthy(),
-            "on_fault": Decision(reference, healthy()),
+            "diagnosis": sound,
+            "on_fault": Decision(reference, sound),
             "controller": ControlOutput(wrench),
-            "allocation": account(vehicle, wrench, healthy(), held),
+            "allocation": account(vehicle, wrench, sound, held),
         }
         memories = []
         for slot, part in self.parts.items():
@@ -142,10 +143,10 @@ class Autopilot:
             if slot.name == "allocation" and isinstance(instant.demand, PerRotor):
                 # The controller commands the rotors itself.
                 wrench, output = direct(vehicle, instant.decision.diagnosis, instant.demand)
-                after, signals = before, example(part.Telemetry)
+                after, signals = before, example(part.Telemetry, vehicle.rotors)
             elif true_loss is not None and isinstance(part, Oracle):
                 output = part.told(true_loss, _inputs(slot, instant), numbers)
-                after, signals = before, example(part.Telemetry)
+                after, signals = before, example(part.Telemetry, vehicle.rotors)
             else:
                 after, output, signals = part.step(before, _inputs(slot, instant), numbers, dt)
             memories.append(after)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import angular_acceleration, drag_acceleration
-from rotorfault.model.signals import FOLLOWING, Motion, Stuck
+from rotorfault.model.signals import Motion, Stuck, following
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
 
 
@@ -36,7 +36,7 @@ class Prediction(NamedTuple):
     delta_omega_B: Vec3  # rad/s
 
 
-def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: Stuck = FOLLOWING) -> Prediction:
+def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: Stuck | None = None) -> Prediction:
     """Velocity changes that the believed rotors, their reaction, gravity, drag and gyroscopics explain.
 
     Parameters
@@ -47,9 +47,10 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
         Believed loss of each rotor, 0 to 1.
     vehicle : Vehicle
         As believed.
-    stuck : Stuck
-        Rotors that are believed not to follow; their loss is not looked at.
+    stuck : Stuck, optional
+        Rotors that are believed not to follow; their loss is not looked at. None if not given.
     """
+    stuck = following(vehicle.rotors) if stuck is None else stuck
     e, before, now = expectation, expectation.previous, expectation.now
     wrench = wrench_of(vehicle, stuck.thrust_of(e.mean_thrust, loss))
     axis_W = (before.axis_W + now.axis_W) * 0.5

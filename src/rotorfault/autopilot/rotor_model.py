@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import lag_held, limited
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 
 
 class RotorModel(NamedTuple):

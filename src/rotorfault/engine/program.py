@@ -29,12 +29,9 @@ from rotorfault.engine.code import Code, declarations, over_groups
 from rotorfault.engine.emit import Emitter, Leaf, merging
 from rotorfault.engine.structure import skeleton
 from rotorfault.engine.trace import Tape, Term
-from rotorfault.loop.closed_loop import LoopParameters
 from rotorfault.maths.geometry import PerRotor, zeros
-from rotorfault.maths.records import flatten, leaf_names, unflatten
-from rotorfault.model.mixer import partner_of_first
+from rotorfault.maths.records import flatten, leaf_names, statics, unflatten
 from rotorfault.model.signals import Command
-from rotorfault.model.vehicle import Vehicle
 
 SEED = ("seed", "index")  # rows after the parameters
 # Parameters of which 0 means that their part of the model is not there. It then costs nothing: the numbers are the
@@ -57,7 +54,7 @@ class SameForAll(NamedTuple):
     """What is the same in every flight of a batch."""
 
     absent: tuple[int, ...] = ()  # rows of the parameters that switch a part of the model off
-    pairs: tuple[float | None, ...] = ()  # conditions of which rotors are opposite each other, where they are known
+    told: tuple[Any, ...] = ()  # what the parameters say without numbers
 
 
 class Section(NamedTuple):
@@ -92,8 +89,7 @@ def same_for_all(batch: Batch) -> SameForAll:
         for row, (name, value) in enumerate(zip(names, values, strict=True))
         if name in ABSENT_AT_ZERO and not np.any(value)
     )
-    pairs = [np.asarray(x) for vehicle in _vehicles(batch.parameters) for x in partner_of_first(vehicle)]
-    return SameForAll(absent, tuple(float(x.flat[0]) if np.all(x == x.flat[0]) else None for x in pairs))
+    return SameForAll(absent, tuple(statics(batch.parameters)))
 
 
 def trace(batch: Batch, same: SameForAll = SameForAll()) -> Traced:  # noqa: B008
@@ -138,7 +134,9 @@ def trace(batch: Batch, same: SameForAll = SameForAll()) -> Traced:  # noqa: B00
 
     tape = Tape()
     state, parameters = _symbols(tape, "state", batch.state), _parameters(tape, batch, same)
-    command, start = unflatten((Command(PerRotor.all(0.0), zeros()), 0.0), tape.leaves("kept", len(kept)))
+    command, start = unflatten(
+        (Command(PerRotor.all(0.0, loop.rotors), zeros()), 0.0), tape.leaves("kept", len(kept))
+    )
     dt = parameters.period * (1.0 / loop.plant.substeps)
     moved = loop.substep(state, command, start + tape.term("count", 0) * dt, parameters, dt)
     move = Section(tape, _state_writes(tape, moved, batch), [])
@@ -170,6 +168,8 @@ def same_code(one: Batch, *others: Batch) -> bool:
     kinds = [type(part) for _, part in one.loop.each()]
     unlike: dict[tuple[float, ...], Batch] = {}
     for other in others:
+        if statics(other.parameters) != statics(one.parameters):
+            return False
         other_words, other_numbers = skeleton(other.loop)
         if other_words != words or any(
             type(part) is not kind for (_, part), kind in zip(other.loop.each(), kinds, strict=True)
@@ -213,20 +213,11 @@ def _symbols(tape: Tape, kind: str, record: Any) -> Any:
 
 
 def _parameters(tape: Tape, batch: Batch, same: SameForAll) -> Any:
-    """The parameters as terms, with what is known of them on the tape."""
+    """The parameters as terms."""
     leaves = tape.leaves("par", len(flatten(batch.parameters)))
     for row in same.absent:
         leaves[row] = tape.absent()
-    parameters = unflatten(batch.parameters, leaves)
-    conditions = [x for vehicle in _vehicles(parameters) for x in partner_of_first(vehicle)]
-    tape.known = {
-        condition.index: value for condition, value in zip(conditions, same.pairs, strict=False) if value is not None
-    }
-    return parameters
-
-
-def _vehicles(parameters: LoopParameters) -> tuple[Vehicle, Vehicle]:
-    return parameters.vehicle, parameters.belief
+    return unflatten(batch.parameters, leaves)
 
 
 def program(traced: Traced, lanes: int, with_signals: bool) -> Program:

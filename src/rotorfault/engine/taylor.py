@@ -74,7 +74,12 @@ class _TaylorPlant:
             batch.loop.held(batch.state),
         )
         motion = (state.body, state.rotors)
-        held = (Command(PerRotor.all(0.0), zeros()), plant.fault(0.0, memory, parameters), memory, parameters)
+        held = (
+            Command(PerRotor.all(0.0, batch.loop.rotors), zeros()),
+            plant.fault(0.0, memory, parameters),
+            memory,
+            parameters,
+        )
         x = hy.make_vars(*(name.replace(".", "_") for name in leaf_names(motion)))
         body, rotors = unflatten(motion, x)
         numbers: tuple[Command, RotorFault, Held, PlantParameters] = unflatten(

@@ -11,10 +11,9 @@ only.
 As everywhere, a literal zero times anything is zero: sparse matrices cost nothing, and hide a NaN in the other
 factor.
 
-What is the same in all flights of a batch is chosen before they fly. A condition that is known (`Tape.known`) takes
-one side of its choices and drops the other. A parameter that switches a part of the model off (`Tape.absent`) is a
-zero that takes its part of the trace with it. Either leaves the numbers as they are to the last bit, for the rounding
-of the rest does not change: what was used by that which is gone still counts as used
+What is the same in all flights of a batch is chosen before they fly. A parameter that switches a part of the model
+off (`Tape.absent`) is a zero that takes its part of the trace with it. That leaves the numbers as they are to the
+last bit, for the rounding of the rest does not change: what was used by that which is gone still counts as used
 (`rotorfault.engine.emit.merging`), a product is still rounded before it is added to what is not there, and a sum with
 that is not taken for the other summand, which other sums may have.
 """
@@ -48,7 +47,6 @@ class Tape:
 
     def __init__(self) -> None:
         self.terms: list[Term] = []
-        self.known: dict[int, float] = {}  # conditions that are the same in every flight, by index: 1 or 0
         self._by_key: dict[tuple[Any, ...], Term] = {}
 
     def term(self, op: str, *args: Any) -> Term:
@@ -306,11 +304,6 @@ def select(condition: Operand, a: Operand, b: Operand) -> Operand:
     if condition.value is not None:
         return a if condition.value else b
     x, y = tape.lift(a), tape.lift(b)
-    known = _known(condition)
-    if known is not None:
-        tape.term("unused", x)
-        tape.term("unused", y)
-        return x if known else y
     if x is y:
         return x
     if condition.truth and x.value == 1.0 and y.value == 0.0:
@@ -318,20 +311,6 @@ def select(condition: Operand, a: Operand, b: Operand) -> Operand:
     if condition.op == "not":
         condition, x, y = condition.args[0], y, x
     return tape.term("select", condition, x, y)
-
-
-def _known(condition: Term) -> float | None:
-    """A condition that is the same in every flight, or made of such."""
-    known = condition.tape.known
-    if condition.index in known or not condition.truth or condition.level != 1:
-        return known.get(condition.index)
-    if condition.op == "not":
-        inside = _known(condition.args[0])
-        return None if inside is None else 1.0 - inside
-    if condition.op == "and":
-        first, second = _known(condition.args[0]), _known(condition.args[1])
-        return None if first is None or second is None else first * second
-    return None
 
 
 def minimum(a: Operand, b: Operand) -> Term:

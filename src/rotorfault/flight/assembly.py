@@ -25,8 +25,8 @@ from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Context, Record
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.slot import Slot
-from rotorfault.model.vehicle import hover_thrust
 from rotorfault.plant.ground import GROUND
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
@@ -154,7 +154,8 @@ def stacked(template: R, records: Sequence[R]) -> R:
 
 def build(scenario: Scenario, own: Own | None = None) -> ClosedLoop:
     """The parts of a scenario put together; see `assemble`."""
-    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, source_of(scenario, own or {}).Telemetry)
+    telemetry = source_of(scenario, own or {}).Telemetry
+    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, telemetry, len(scenario.vehicle.rotor))
 
 
 def parts_of(scenario: Scenario, own: Own) -> dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]:
@@ -213,7 +214,7 @@ class _Assembly:
     def batch(self) -> Batch:
         """Loop, state, numbers and reference of the flights."""
         scenario, source = self.scenario, source_of(self.scenario, self.own)
-        loop = ClosedLoop(parts_of(scenario, self.own), scenario.substeps, source.Telemetry)
+        loop = build(scenario, self.own)
         reference = reference_of(scenario, source)
         parameters = self.parameters(loop)
         believed, true = parameters.belief, parameters.vehicle
@@ -229,7 +230,7 @@ class _Assembly:
             believed.thrust_max,
             0.0 if ground is None else ground.bottom(parameters.parts.ground),
             true.mass * true.gravity,
-            hover_thrust(believed).r1 / believed.rotor_gain,
+            hover_thrust(believed).sum() / believed.rotors / believed.rotor_gain,
             reference,
         )
         parameters = parameters._replace(scoring=scoring)
@@ -262,6 +263,9 @@ class _Assembly:
                 about = f"flight {self.flights[np.argmax(inverse == number)]}"
                 true = true_vehicle(vehicle, mismatch[0], self.scenario.grid, about) if mismatch else vehicle.vehicle
                 made.append(Context(true, period))
+            # One loop for all: what has a closed form for some of them only is not used for any.
+            if any(context.vehicle.pairs != made[0].vehicle.pairs for context in made):
+                made = [context._replace(vehicle=context.vehicle._replace(pairs=())) for context in made]
             self._told[truth] = made, inverse
         return self._told[truth]
 

@@ -110,7 +110,7 @@ def _faults(scenario: Scenario) -> list[tuple[Any, Any]]:
 
 def _unattainable(scenario: Scenario) -> Iterator[str]:
     """What the losses that remain for good leave of hover, if that is not all of it."""
-    left = [1.0, 1.0, 1.0, 1.0]
+    left = [1.0] * len(scenario.vehicle.rotor)
     for fault, numbers in _faults(scenario):
         loss = fault.final_loss(numbers)
         if loss is not None and fault.onset(numbers) < scenario.duration:

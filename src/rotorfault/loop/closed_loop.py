@@ -27,10 +27,11 @@ from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Command, Reference
 from rotorfault.model.slot import Slot
 from rotorfault.model.telemetry import example
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
 from rotorfault.plant.models import PLANT
@@ -93,6 +94,8 @@ class ClosedLoop:
         Integration steps per sampling period, at least 1.
     reference : type of NamedTuple
         Signals of the reference's own.
+    rotors : int
+        Of the vehicle.
 
     Attributes
     ----------
@@ -104,8 +107,8 @@ class ClosedLoop:
         parts = ", ".join(f"{slot.name} {type(part).__name__}" for slot, part in self.each())
         return cut(f"<closed loop of {parts}>", LONGEST)
 
-    def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing) -> None:
-        self.parts = dict(parts)
+    def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing, rotors: int = 4) -> None:
+        self.parts, self.rotors = dict(parts), rotors
         truth = {slot: part for slot, part in self.parts.items() if slot.side == "truth"}
         self.autopilot = Autopilot(
             {slot: cast("AnyBlock", part) for slot, part in self.parts.items() if slot.side == "belief"}
@@ -124,13 +127,14 @@ class ClosedLoop:
                 telemetry[slot.name] = part.Telemetry
         response = self.maybe(ON_FAULT)
         lands = response is not None and response.lands
-        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry)
+        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry, rotors)
         self.layout = self.recorder.layout
         self.scoring = Scoring(
             ground=self.plant.ground is not None,
             lands=lands,
             faulty=tuple(fault.rotor for fault in self.plant.faults),
             signals=self.layout.signals,
+            rotors=rotors,
         )
 
     def __getitem__(self, slot: Slot[B]) -> B:
@@ -179,7 +183,7 @@ class ClosedLoop:
         reference : Reference, optional
             The origin, at rest, if not given.
         """
-        own = () if self.reference is Nothing else example(self.reference)
+        own = () if self.reference is Nothing else example(self.reference, self.rotors)
         widths = {slot.name: part.normals for slot, part in self.each() if part.normals}
         zeros_of = record_type("Normals", tuple(widths))(*((0.0,) * width for width in widths.values()))
         return Drive(no_reference() if reference is None else reference, own, zeros_of)

@@ -82,6 +82,8 @@ class Recorder:
         Whether the response to a fault may land.
     parts : dict
         What each part records, by slot.
+    rotors : int
+        Of the vehicle.
 
     Attributes
     ----------
@@ -89,7 +91,7 @@ class Recorder:
         Names, units and rows of all signals.
     """
 
-    def __init__(self, ground: bool, lands: bool, parts: dict[str, type[Record]]) -> None:
+    def __init__(self, ground: bool, lands: bool, parts: dict[str, type[Record]], rotors: int = 4) -> None:
         self._ground, self._lands = ground, lands
         self._parts = {name: kind for name, kind in parts.items() if kind is not Nothing}
         common: list[type[Record]] = [LoopSignals]
@@ -101,7 +103,7 @@ class Recorder:
         fields = [*(signal.name for signal in signals), "parts"]
         for name, kind in self._parts.items():
             signals += signals_of(kind, name)
-        self.layout = Layout(tuple(signals))
+        self.layout = Layout(tuple(signals), rotors)
         self._record = record_type("Signals", tuple(fields))
 
     def record(self, truth: Truth, command: Command, report: AutopilotReport, telemetry: dict[str, Record]) -> Any:

@@ -93,11 +93,19 @@ class Scoring:
         Rotor of each fault, from 1.
     signals : tuple of Signal
         What is recorded; those with a score are counted.
+    rotors : int
+        Of the vehicle.
     """
 
     def __init__(
-        self, ground: bool, lands: bool = False, faulty: tuple[int, ...] = (), signals: tuple[Signal, ...] = ()
+        self,
+        ground: bool,
+        lands: bool = False,
+        faulty: tuple[int, ...] = (),
+        signals: tuple[Signal, ...] = (),
+        rotors: int = 4,
     ) -> None:
+        self.count_of_rotors = rotors
         self.ground, self.lands, self.faulty = ground, lands, faulty
         self.rotors = tuple(sorted(set(faulty)))
         self.counted = tuple(signal for signal in signals if signal.quantity.score is not None)
@@ -107,13 +115,14 @@ class Scoring:
     def initial(self) -> Scores:
         """Nothing counted."""
         none, never = zeros(), Vec3(-1.0, -1.0, -1.0)
+        each_rotor = PerRotor.all(0.0, self.count_of_rotors)
         landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0) if self.lands else ()
         return Scores(
             over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,
             yaw_error=0.0, position_square=none, attitude_square=none, position_error=none,
             attitude=Quat.identity(), velocity=none,
             cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, away=0.0, drop=0.0,
-            variation=0.0, command=PerRotor.all(0.0), saturated=0.0, given_up=none, flags=PerRotor.all(0.0),
+            variation=0.0, command=each_rotor, saturated=0.0, given_up=none, flags=each_rotor,
             false_alarms=0.0,
             touched=0.0, gentle=1.0, rest=0.0,
             detections=tuple(Detection(-1.0, 0.0, 0.0, 0.0, 0.0) for _ in self.rotors),

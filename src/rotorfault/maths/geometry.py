@@ -1,8 +1,8 @@
 """Value types with operators.
 
 `Vec3` and `Mat3` hold scalars of any kind (see `rotorfault.maths.scalar`), so equations read as in a paper:
-``thrust_W / mass + g_W``, ``omega.cross(J @ omega)``, ``Y.T @ Y``. `PerRotor` holds one scalar per rotor, in the
-order rotor 1, 2, 3, 4, and works elementwise.
+``thrust_W / mass + g_W``, ``omega.cross(J @ omega)``, ``Y.T @ Y``. `PerRotor` holds one scalar per rotor, in
+the order of the vehicle, and works elementwise.
 
 Rotations are in `rotorfault.maths.rotation`.
 """
@@ -23,17 +23,22 @@ class Value:
     # Without this, ndarray * Vec3 would be broadcast by NumPy into an array of objects.
     __array_ufunc__ = None
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the scalars, in their order."""
+        return self.__slots__
+
     def __iter__(self) -> Iterator[Scalar]:
         return (getattr(self, name) for name in self.__slots__)
 
     def __repr__(self) -> str:
         # Numbers with all their digits, arrays by their shape.
         texts = [repr(value) if isinstance(value, float) else brief(value) for value in self]
-        inside = ", ".join(f"{name}={text}" for name, text in zip(self.__slots__, texts, strict=True))
+        inside = ", ".join(f"{name}={text}" for name, text in zip(self.names, texts, strict=True))
         return f"{type(self).__name__}({inside})"
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and all(a == b for a, b in zip(self, other, strict=True))
+        return type(other) is type(self) and [*self] == [*other]
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -235,28 +240,54 @@ class Mat3(Value):
 
 
 class PerRotor(Value):
-    """One scalar per rotor, in the order rotor 1, 2, 3, 4; all operators work elementwise."""
+    """One scalar per rotor, in the order of the vehicle; all operators work elementwise.
 
-    __slots__ = ("r1", "r2", "r3", "r4")
+    Parameters
+    ----------
+    *values : scalar
+        Of rotor 1, 2, ...; as many as the vehicle has rotors.
+    """
 
-    def __init__(self, r1: Scalar, r2: Scalar, r3: Scalar, r4: Scalar) -> None:
-        self.r1, self.r2, self.r3, self.r4 = r1, r2, r3, r4
+    __slots__ = ("_values",)
+
+    def __init__(self, *values: Scalar) -> None:
+        self._values = values
 
     @classmethod
-    def all(cls, value: Scalar) -> PerRotor:
-        """The same value for each rotor."""
-        return cls(value, value, value, value)
+    def all(cls, value: Scalar, count: int = 4) -> PerRotor:
+        """The same value for each of so many rotors."""
+        return cls(*(value,) * count)
 
     @classmethod
     def of(cls, values: Iterable[Scalar]) -> PerRotor:
-        """Make it of four values in an iterable."""
-        r1, r2, r3, r4 = values
-        return cls(r1, r2, r3, r4)
+        """Make it of the values in an iterable."""
+        return cls(*values)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """r1, r2, ..."""
+        return tuple(f"r{number}" for number in range(1, len(self._values) + 1))
+
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getitem__(self, index: int) -> Scalar:
+        """The value of a rotor; 0 is rotor 1."""
+        return self._values[index]
+
+    def __getattr__(self, name: str) -> Scalar:
+        # r1, r2, ...: looked up only where there is no other attribute of that name.
+        if name[:1] == "r" and name[1:].isdecimal() and 0 < int(name[1:]) <= len(self._values):
+            return self._values[int(name[1:]) - 1]
+        raise AttributeError(f"{type(self).__name__} has no {name}")
 
     def _with(self, other: PerRotor | Scalar, operation: Callable[[Scalar, Scalar], Scalar]) -> PerRotor:
         if isinstance(other, PerRotor):
-            return PerRotor(*(operation(a, b) for a, b in zip(self, other, strict=True)))
-        return PerRotor(*(operation(a, other) for a in self))
+            return PerRotor(*(operation(a, b) for a, b in zip(self._values, other._values, strict=True)))
+        return PerRotor(*(operation(a, other) for a in self._values))
 
     def __add__(self, other: PerRotor | Scalar) -> PerRotor:
         return self._with(other, lambda a, b: a + b)
@@ -270,7 +301,7 @@ class PerRotor(Value):
         return self._with(other, lambda a, b: b - a)
 
     def __neg__(self) -> PerRotor:
-        return PerRotor(-self.r1, -self.r2, -self.r3, -self.r4)
+        return PerRotor(*(-a for a in self._values))
 
     def __mul__(self, other: PerRotor | Scalar) -> PerRotor:
         return self._with(other, lambda a, b: a * b)
@@ -286,15 +317,21 @@ class PerRotor(Value):
 
     def dot(self, other: PerRotor) -> Scalar:
         """Sum over the rotors of the products."""
-        return self.r1 * other.r1 + self.r2 * other.r2 + self.r3 * other.r3 + self.r4 * other.r4
+        first, *more = (a * b for a, b in zip(self._values, other._values, strict=True))
+        return sum(more, first)
 
     def sum(self) -> Scalar:
         """Sum over the rotors."""
-        return self.r1 + self.r2 + self.r3 + self.r4
+        first, *more = self._values
+        return sum(more, first)
 
     def reduce(self, function: Callable[[Scalar, Scalar], Scalar]) -> Scalar:
-        """Fold the four values with a function of two, such as `rotorfault.maths.scalar.minimum`."""
-        return function(function(self.r1, self.r2), function(self.r3, self.r4))
+        """Fold the values with a function of two, such as `rotorfault.maths.scalar.minimum`, in pairs."""
+        values = [*self._values]
+        while len(values) > 1:
+            paired = [function(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
+            values = paired + values[2 * len(paired) :]
+        return values[0]
 
 
 def zeros() -> Vec3:

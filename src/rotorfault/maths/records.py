@@ -1,8 +1,9 @@
 """Records of scalars: flatten to rows of an array, and back.
 
-A *record* is a NamedTuple whose fields are scalars, value types (`rotorfault.maths.geometry`) or records. What flows
-through the closed loop (state, memory, inputs, parameters, signals) is made of records, so that one generic
-function turns any of it into rows of an array for the batch engines, and names every row.
+A *record* is a NamedTuple whose fields are scalars, value types (`rotorfault.maths.geometry`), records, or what has
+no numbers (`Static`). What flows through the closed loop (state, memory, inputs, parameters, signals) is made of
+records, so that one generic function turns any of it into rows of an array for the batch engines, and names every
+row.
 
 A NamedTuple's ``+`` concatenates: records carry data, value types carry algebra.
 """
@@ -20,10 +21,21 @@ from rotorfault.maths.scalar import Scalar, select
 R = TypeVar("R")
 
 
+class Static:
+    """What a record says without numbers, such as which rotors are opposite; the same in all flights of a batch.
+
+    It has no leaves, and stays as it is wherever the record goes. Two that say the same are equal.
+    """
+
+    __slots__ = ()
+
+
 def _parts(record: Any) -> Iterator[tuple[str, Any]] | None:
     """Name and value of each direct part, or None for a leaf."""
     if isinstance(record, Value):
-        return ((name, getattr(record, name)) for name in record.__slots__)
+        return zip(record.names, record, strict=True)
+    if isinstance(record, Static):
+        return iter(())
     if isinstance(record, tuple):
         names = getattr(record, "_fields", None) or (str(i) for i in range(len(record)))
         return zip(names, record, strict=True)
@@ -78,12 +90,22 @@ def unflatten(template: R, leaves: Iterator[Scalar] | list[Scalar]) -> R:
                 return next(source)
             except StopIteration:
                 raise ValueError("fewer scalars than the record has fields") from None
+        if isinstance(part, Static):
+            return part
         values = [build(inner) for _, inner in parts]
         if isinstance(part, Value) or hasattr(part, "_fields"):
             return type(part)(*values)
         return tuple(values)
 
     return build(template)  # type: ignore[no-any-return]
+
+
+def statics(record: Any) -> list[Static]:
+    """All that a record says without numbers, depth first."""
+    if isinstance(record, Static):
+        return [record]
+    parts = _parts(record)
+    return [] if parts is None else [one for _, part in parts for one in statics(part)]
 
 
 def select_record(condition: Scalar, a: R, b: R) -> R:

@@ -20,9 +20,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, either, less, select
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.effectiveness import effectiveness, pseudo_inverse
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Opposite, Vehicle
 
 
 class PairDemand(NamedTuple):
@@ -37,18 +38,6 @@ class PairDemand(NamedTuple):
     D34: Scalar  # N, F3 - F4
 
 
-def partner_of_first(vehicle: Vehicle) -> tuple[Scalar, Scalar]:
-    """1 or 0: whether the partner of rotor 1 is rotor 2, and whether it is rotor 3; else it is rotor 4.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Two opposite pairs of rotors in any order.
-    """
-    s = vehicle.rotor_yaw_sign
-    return less(0.0, s.r1 * s.r2), less(0.0, s.r1 * s.r3)
-
-
 def in_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
     """Values of the rotors in the order of pairs.
 
@@ -59,14 +48,7 @@ def in_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
     values : PerRotor
         In the order of the vehicle.
     """
-    second, third = partner_of_first(vehicle)
-    r1, r2, r3, r4 = values
-    return PerRotor(
-        r1,
-        select(second, r2, select(third, r3, r4)),
-        select(second, r3, r2),
-        select(either(second, third), r4, r3),
-    )
+    return PerRotor.of(values[index] for index in _order(vehicle))
 
 
 def from_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
@@ -79,14 +61,13 @@ def from_pairs(vehicle: Vehicle, values: PerRotor) -> PerRotor:
     values : PerRotor
         In the order of pairs.
     """
-    second, third = partner_of_first(vehicle)
-    r1, r2, r3, r4 = values
-    return PerRotor(
-        r1,
-        select(second, r2, r3),
-        select(second, r3, select(third, r2, r4)),
-        select(either(second, third), r4, r2),
-    )
+    order = _order(vehicle)
+    return PerRotor.of(values[order.index(index)] for index in range(len(order)))
+
+
+def _order(vehicle: Vehicle) -> tuple[int, int, int, int]:
+    assert isinstance(vehicle.pairs, Opposite), "this vehicle has no two opposite pairs of rotors"
+    return vehicle.pairs.order
 
 
 def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
@@ -108,7 +89,7 @@ def pair_demand(vehicle: Vehicle, wrench: Wrench) -> PairDemand:
     y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
     tau = wrench.torque_B
     det = x1 * y3 - x3 * y1
-    yaw = tau.z / (vehicle.rotor_yaw_sign.r1 * vehicle.torque_ratio)
+    yaw = tau.z / (vehicle.rotor_yaw_sign[0] * vehicle.torque_ratio)
     return PairDemand(
         S12=(wrench.thrust + yaw) * 0.5,
         S34=(wrench.thrust - yaw) * 0.5,
@@ -124,5 +105,19 @@ def rotor_thrusts(pairs: PairDemand) -> PerRotor:
 
 
 def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
-    """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected."""
-    return from_pairs(vehicle, rotor_thrusts(pair_demand(vehicle, wrench)))
+    """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected.
+
+    Of more than four rotors, of all thrusts that give it those with the least sum of squares.
+    """
+    if vehicle.pairs != ():
+        return from_pairs(vehicle, rotor_thrusts(pair_demand(vehicle, wrench)))
+    return pseudo_inverse(effectiveness(vehicle)).times(wrench)
+
+
+def hover_thrust(vehicle: Vehicle) -> PerRotor:
+    """Thrust per rotor in level hover with sound rotors, in N."""
+    weight = vehicle.mass * vehicle.gravity
+    if vehicle.pairs != ():
+        return PerRotor.all(weight / 4.0)
+    thrust: PerRotor = pseudo_inverse(effectiveness(vehicle)).thrust * weight
+    return thrust

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, clip, exp
-from rotorfault.model.signals import FOLLOWING, Stuck
+from rotorfault.model.signals import Stuck
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
 
 
@@ -67,7 +67,7 @@ def limited(vehicle: Vehicle, command: PerRotor) -> PerRotor:
     return command.map(lambda c: clip(c, vehicle.thrust_min, vehicle.thrust_max))
 
 
-def effect_of(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING) -> PerRotor:
+def effect_of(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = None) -> PerRotor:
     """Steady thrust per commanded thrust of each rotor, (1 - loss) k of (7), (8); 0 where it is stuck.
 
     Parameters
@@ -78,7 +78,8 @@ def effect_of(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING) -> Per
     stuck : Stuck
         Rotors that do not follow; none if not given.
     """
-    effect: PerRotor = stuck.effectiveness(loss) * vehicle.rotor_gain
+    left = 1.0 - loss if stuck is None else stuck.effectiveness(loss)
+    effect: PerRotor = left * vehicle.rotor_gain
     return effect
 
 

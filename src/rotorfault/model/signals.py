@@ -121,8 +121,8 @@ class Reference(NamedTuple):
 class Stuck(NamedTuple):
     """Rotors that give a thrust of their own, whatever they are commanded."""
 
-    rotor: PerRotor = PerRotor.all(0.0)  # 1 where that is so
-    thrust: PerRotor = PerRotor.all(0.0)  # N: what they give then; 0 for others
+    rotor: PerRotor  # 1 where that is so
+    thrust: PerRotor  # N: what they give then; 0 for others
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -151,19 +151,62 @@ class Stuck(NamedTuple):
         return thrust
 
 
-FOLLOWING = Stuck()
-"""Every rotor follows its command."""
+def following(rotors: int) -> Stuck:
+    """So many rotors, each of which follows its command."""
+    none = PerRotor.all(0.0, rotors)
+    return Stuck(none, none)
 
 
-class Diagnosis(NamedTuple):
-    """The autopilot's belief about the rotors."""
-
+class _Diagnosis(NamedTuple):
     loss: PerRotor  # believed loss of effectiveness, 0 healthy .. 1 dead; 0 for rotors that are not flagged
     flagged: PerRotor  # 1 where a fault is declared
     estimate: PerRotor  # raw estimated loss, before any decision
     residual: PerRotor  # N: estimated thrust less the thrust that a healthy rotor would give
-    test: PerRotor = PerRotor.all(0.0)  # N: least thrust of a sound rotor to command, to see whether it gives any
-    stuck: Stuck = FOLLOWING  # rotors that do not follow; their loss is the share that is missing at this instant
+    test: PerRotor  # N: least thrust of a sound rotor to command, to see whether it gives any
+    stuck: Stuck  # rotors that do not follow; their loss is the share that is missing at this instant
+
+
+class Diagnosis(_Diagnosis):
+    """The autopilot's belief about the rotors.
+
+    Parameters
+    ----------
+    loss : PerRotor
+        Believed loss of effectiveness, 0 healthy to 1 dead; 0 for rotors that are not flagged.
+    flagged : PerRotor
+        1 where a fault is declared.
+    estimate : PerRotor
+        Raw estimated loss, before any decision.
+    residual : PerRotor, N
+        Estimated thrust less the thrust that a healthy rotor would give.
+    test : PerRotor, N, optional
+        Least thrust of a sound rotor to command, to see whether it gives any; none if not given.
+    stuck : Stuck, optional
+        Rotors that do not follow; none if not given. Their loss is the share that is missing at this instant.
+    """
+
+    __slots__ = ()
+
+    def __new__(
+        cls,
+        loss: PerRotor,
+        flagged: PerRotor,
+        estimate: PerRotor,
+        residual: PerRotor,
+        test: PerRotor | None = None,
+        stuck: Stuck | None = None,
+    ) -> Diagnosis:
+        """What is not said of tests and stuck rotors is that there are none."""
+        count = len(loss)
+        return super().__new__(
+            cls,
+            loss,
+            flagged,
+            estimate,
+            residual,
+            PerRotor.all(0.0, count) if test is None else test,
+            following(count) if stuck is None else stuck,
+        )
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -191,9 +234,9 @@ class Allocation(NamedTuple):
         return record_line(self)
 
 
-def healthy() -> Diagnosis:
-    """The belief that every rotor is sound."""
-    none = PerRotor.all(0.0)
+def healthy(rotors: int = 4) -> Diagnosis:
+    """The belief that every one of so many rotors is sound."""
+    none = PerRotor.all(0.0, rotors)
     return Diagnosis(loss=none, flagged=none, estimate=none, residual=none)
 
 

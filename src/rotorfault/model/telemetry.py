@@ -47,10 +47,15 @@ KINDS: dict[Any, Any] = {
     Scalar: 0.0,
     Vec3: Vec3(0.0, 0.0, 0.0),
     Quat: Quat.identity(),
-    PerRotor: PerRotor.all(0.0),
+    PerRotor: PerRotor.all(0.0, 4),
     Mat3: Mat3.identity(),
 }
-"""Types that a signal may have, each with a value of its shape."""
+"""Types that a signal may have, each with a value of its shape; that of `PerRotor` is as long as there are rotors."""
+
+
+def value_of(kind: Any, rotors: int) -> Any:
+    """A value of the shape that a kind of signal has on a vehicle with so many rotors."""
+    return PerRotor.all(0.0, rotors) if kind is PerRotor else KINDS[kind]
 
 
 class Signal(NamedTuple):
@@ -94,9 +99,9 @@ def signals_of(telemetry: type[tuple[Any, ...]], prefix: str = "") -> tuple[Sign
     return tuple(signals)
 
 
-def example(telemetry: type[tuple[Any, ...]]) -> Any:
+def example(telemetry: type[tuple[Any, ...]], rotors: int = 4) -> Any:
     """A record of this shape, its numbers without meaning."""
-    return telemetry(*(KINDS[signal.kind] for signal in signals_of(telemetry)))
+    return telemetry(*(value_of(signal.kind, rotors) for signal in signals_of(telemetry)))
 
 
 @final
@@ -107,6 +112,8 @@ class Layout:
     ----------
     signals : tuple of Signal
         In the order in which the record of them is flattened.
+    rotors : int
+        Of the vehicle.
 
     Attributes
     ----------
@@ -114,13 +121,13 @@ class Layout:
         Dotted name of each row, such as ``position.x`` or ``controller.gain_angle.xy``.
     """
 
-    def __init__(self, signals: tuple[Signal, ...]) -> None:
-        self.signals = signals
-        self.rows = tuple(row for signal in signals for row in leaf_names(KINDS[signal.kind], signal.name))
+    def __init__(self, signals: tuple[Signal, ...], rotors: int = 4) -> None:
+        self.signals, self.rotors = signals, rotors
+        self.rows = tuple(row for signal in signals for row in leaf_names(value_of(signal.kind, rotors), signal.name))
         self._starts: dict[str, slice] = {}
         first = 0
         for signal in signals:
-            width = len(leaf_names(KINDS[signal.kind]))
+            width = len(leaf_names(value_of(signal.kind, rotors)))
             self._starts[signal.name] = slice(first, first + width)
             first += width
 

@@ -1,4 +1,4 @@
-"""A quadrotor's parameters, and its effectiveness: how rotor thrusts become a wrench.
+"""A multirotor's parameters, and its effectiveness: how rotor thrusts become a wrench.
 
 Rotor i sits at (x_i, y_i) in the body frame; a thrust F_i there gives the torque (y_i F_i, -x_i F_i) and the yaw
 torque s_i kappa F_i, where s_i is +1 for a rotor that pushes the body towards positive yaw. For the paper's
@@ -12,16 +12,45 @@ geometry (rotor 1 front, 2 rear, 3 right, 4 left) this is its equation (4) with 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, final
 
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.records import Static
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.signals import Wrench
 
+FEWEST_ROTORS, MOST_ROTORS = 3, 16
+"""That a vehicle may have."""
+
+
+@final
+class Opposite(Static):
+    """Says that a quadrotor's rotors are two pairs, each opposite about the centre of mass and turning the same way.
+
+    Parameters
+    ----------
+    order : tuple of int
+        Indices from 0: rotor 1, its partner, the lower of the others, the higher.
+    """
+
+    __slots__ = ("order",)
+
+    def __init__(self, order: tuple[int, int, int, int]) -> None:
+        self.order = order
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.order})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Opposite) and other.order == self.order
+
+    def __hash__(self) -> int:
+        return hash(self.order)
+
 
 class Vehicle(NamedTuple):
-    """Numbers of one quadrotor, SI units. Truth and belief each hold their own."""
+    """Numbers of one multirotor, SI units. Truth and belief each hold their own."""
 
     mass: Scalar  # kg
     inertia: Vec3  # kg m^2, principal moments about body x, y, z
@@ -38,6 +67,12 @@ class Vehicle(NamedTuple):
     linear_drag: Scalar  # N s/m, force per speed relative to the air (k_d)
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
+    pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
+
+    @property
+    def rotors(self) -> int:
+        """How many there are."""
+        return len(self.rotor_x)
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -107,8 +142,3 @@ def gyroscopic_torque(vehicle: Vehicle, omega_B: Vec3, residual: Scalar) -> Vec3
     """
     momentum = rotor_momentum(vehicle, residual)
     return Vec3(-omega_B.y * momentum, omega_B.x * momentum, 0.0)
-
-
-def hover_thrust(vehicle: Vehicle) -> PerRotor:
-    """Thrust per rotor in level hover with sound rotors, in N, for rotors at equal distance on opposite arms."""
-    return PerRotor.all(vehicle.mass * vehicle.gravity / 4.0)

@@ -21,9 +21,9 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle, hover_thrust, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rotor_speeds
 
 ANGLE = 0.5  # rad, by which the least authority turns
 TIMES = Vec3(0.5, 0.5, 2.0)  # s, about roll, pitch, yaw; our choice: a gust builds up in as much, yaw can wait
@@ -79,7 +79,7 @@ def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
     """Axes that can hardly be reached, each with what there is to say."""
     hover = hover_thrust(vehicle)
     low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
-    spare = min(high - hover.r1, hover.r1 - low)
+    spare = min(min(float(high - f), float(f - low)) for f in hover)
     for name, key, moment, least, time, unit in zip(
         AXES, "xyz", vehicle.inertia, LEAST, TIMES, (Vec3.of(row) for row in _UNITS), strict=True
     ):
@@ -92,7 +92,7 @@ def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
         line = (
             f"{name}: hover leaves an angular acceleration of {turn:.3g} rad/s^2 ({have}); turning by {ANGLE:g} rad "
             f"within {time:g} s takes {least:g} rad/s^2, so the axis can hardly be controlled; "
-            f"{_remedy(name, spare / hover.r1)}"
+            f"{_remedy(name, spare / min(float(f) for f in hover))}"
         )
         yield name, line
 
@@ -193,7 +193,7 @@ def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
         return math.sqrt(math.sqrt(b / THRUST))
 
     def tip(b: float) -> float:
-        return radius(b) * float(rotor_speeds(v._replace(thrust_coefficient=b), hover).r1)
+        return radius(b) * float(rotor_speeds(v._replace(thrust_coefficient=b), hover)[0])
 
     per_turn = {
         "in N/rpm^2": _times((30.0 / math.pi) ** 2),
@@ -202,7 +202,7 @@ def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
         "in gf/(rad/s)^2": _times(9.80665e-3),
     }
     b = v.thrust_coefficient
-    speed = float(rotor_speeds(v, hover).r1)
+    speed = float(rotor_speeds(v, hover)[0])
     what = (
         f"speed of the blades' tips in hover, at {speed:.4g} rad/s of blades of about {1e3 * radius(b):.3g} mm [m/s],"
     )
@@ -219,7 +219,7 @@ def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
     }
     what = "drag torque over thrust, k_M / k_F, over the arm"
     yield _Proportion("torque_ratio", v.torque_ratio, "m", what, lambda kappa: kappa / arm, 0.005, 0.1, 1.0, ratio)
-    weights = v.rotor_gain * 4.0 / (v.mass * v.gravity)
+    weights = v.rotor_gain * v.rotors / (v.mass * v.gravity)
     grams = {"in gf": _times(9.80665e-3), "in mN": _times(1e-3)}
     yield _Proportion(
         "thrust_max", v.thrust_max, "N", "thrust-to-weight", lambda F: F * weights, 1.0, 2.5, 25.0, grams

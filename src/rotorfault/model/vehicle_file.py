@@ -4,7 +4,7 @@
     description = "one line"
     mass = { value = 1.77, unit = "kg", source = "paper, section 5" }
     ...
-    [[rotor]]                    # four of them in any order: two pairs, opposite each other
+    [[rotor]]                    # 3 to 16 of them, in any order
     name = "front"               # optional: the vendor's name
     x = { value = 0.42, unit = "m", source = "paper, (3)" }    # forward of the centre of mass
     y = { value = 0.0, unit = "m", source = "..." }            # left of it
@@ -29,12 +29,14 @@ from rotorfault.base.bounds import require
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.one_line import cut
+from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle
 
 Pairs = tuple[tuple[int, int], tuple[int, int]]
 _PAIRINGS: tuple[Pairs, ...] = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
 BALANCE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
+LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
 
 
 class Quantity(Strict):
@@ -106,11 +108,17 @@ class VehicleFile(Strict):
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
     )
-    rotor: tuple[Rotor, ...] = Field(description="four rotors in any order: two pairs, opposite each other")
+    rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
     @model_validator(mode="after")
     def _consistent(self) -> VehicleFile:
-        for check in (self._check_inertia, self._check_thrust, self._check_pairs, self._check_rank):
+        for check in (
+            self._check_inertia,
+            self._check_count,
+            self._check_thrust,
+            self._check_rank,
+            self._check_hover,
+        ):
             error = check()
             if error is not None:
                 raise error
@@ -167,12 +175,18 @@ class VehicleFile(Strict):
                 return refusal(f"inertia_{axis}", f"{message} body has more); check the exponents")
         return None
 
+    def _check_count(self) -> PydanticCustomError | None:
+        count = len(self.rotor)
+        if FEWEST_ROTORS <= count <= MOST_ROTORS:
+            return None
+        return refusal("rotor", f"got {count} tables; allowed: {FEWEST_ROTORS} to {MOST_ROTORS} [[rotor]] tables")
+
     def _check_thrust(self) -> PydanticCustomError | None:
         low, high = self.thrust_min.value, self.thrust_max.value
         if not low < high:
             return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
         ratio = self.thrust_to_weight
-        hover = self.mass.value * self.gravity.value / (4.0 * self.rotor_gain.value)
+        hover = self.mass.value * self.gravity.value / (len(self.rotor) * self.rotor_gain.value)
         if not ratio > 1.0:
             message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"
             grams = f"; if mass is in g, write {0.001 * self.mass.value:g} kg" if 1.0 < 1e3 * ratio < 25.0 else ""
@@ -184,33 +198,52 @@ class VehicleFile(Strict):
             )
         return None
 
-    def _check_pairs(self) -> PydanticCustomError | None:
-        if len(self.rotor) != 4:
-            return refusal("rotor", f"got {len(self.rotor)} tables; allowed: four [[rotor]] tables")
-        pairs = self.pairs
-        for first, second in pairs:
-            a, b = self.rotor[first], self.rotor[second]
-            both = f"{self.rotor_label(first)} and {self.rotor_label(second)}"
-            for axis, off in (("x", a.x.value + b.x.value), ("y", a.y.value + b.y.value)):
-                if not abs(off) <= BALANCE_TOLERANCE:
-                    message = f"{both} must be opposite about the centre of mass: their {axis} sum to {off:.6g} m;"
-                    return refusal(f"rotor.{second}.{axis}", f"{message} allowed: 0")
-            if a.yaw != b.yaw:
-                message = f"got '{b.yaw}'; allowed: '{a.yaw}', as {both} are opposite and turn the same way"
-                return refusal(f"rotor.{second}.yaw", message)
-        if self.rotor[0].yaw == self.rotor[pairs[1][0]].yaw:
-            one, other = (" and ".join(self.rotor_label(k) for k in pair) for pair in pairs)
-            message = f"got '{self.rotor[0].yaw}' for all rotors; allowed: one sign for {one}, the other for {other}"
-            return refusal(f"rotor.{pairs[1][0]}.yaw", message)
+    def _check_rank(self) -> PydanticCustomError | None:
+        """Whether thrust, roll and pitch can be had independently, and yaw where there are rotors enough for it."""
+        rows = self._scaled_rows()
+        names = ("thrust", "roll", "pitch", "yaw")
+        # A flat tricopter has no yaw of its own, and flies without.
+        count = min(len(self.rotor), len(names))
+        for row in range(1, count):
+            others = np.delete(rows[:count], row, axis=0)
+            left = rows[row] - np.linalg.lstsq(others.T, rows[row], rcond=None)[0] @ others
+            length = float(np.linalg.norm(rows[row]))
+            share = float(np.linalg.norm(left)) / max(length, 1e-300)
+            if length < LEAST_ROW or share < LEAST_ROW:
+                return refusal(
+                    "rotor",
+                    f"these {len(self.rotor)} rotors cannot give {names[row]} independently of the other axes "
+                    f"({share:.2g} of it is its own); allowed: rotors on different lines through the centre of mass, "
+                    "and some of each sense of rotation",
+                )
         return None
 
-    def _unlike_pairs(self, pairs: Pairs) -> tuple[float, int]:
-        """How far rotors are from opposite, and how many pairs push different ways in yaw."""
-        rotors = [(self.rotor[a], self.rotor[b]) for a, b in pairs]
-        off = [math.hypot(a.x.value + b.x.value, a.y.value + b.y.value) for a, b in rotors]
-        # Below the tolerance no distance counts, so that the sense of rotation decides.
-        far = math.fsum(x for x in off if not x <= BALANCE_TOLERANCE)
-        return far, sum(a.yaw != b.yaw for a, b in rotors)
+    def _check_hover(self) -> PydanticCustomError | None:
+        """Whether the rotors can carry the weight level with no torque left over, each within its limits."""
+        if self.pairs is not None:
+            return None
+        from scipy.optimize import linprog
+
+        weight = self.mass.value * self.gravity.value
+        rows = self._scaled_rows()[: min(len(self.rotor), 4)]
+        low, high = (self.rotor_gain.value * limit.value for limit in (self.thrust_min, self.thrust_max))
+        balance = [weight, *(0.0,) * (len(rows) - 1)]
+        if linprog(np.zeros(len(self.rotor)), A_eq=rows, b_eq=balance, bounds=(low, high)).status == 0:
+            return None
+        x, y = np.mean([(rotor.x.value, rotor.y.value) for rotor in self.rotor], axis=0)
+        return refusal(
+            "rotor",
+            f"no thrusts of {low:g} to {high:g} N carry {weight:.4g} N with all torques in balance; the middle of "
+            f"the rotors is {1e3 * x:.3g} mm forward and {1e3 * y:.3g} mm left of the centre of mass: check x and y, "
+            "which count from there, yaw and thrust_max",
+        )
+
+    def _scaled_rows(self) -> Array:
+        """Thrust, roll, pitch and yaw of a newton of each rotor, torques over the longest arm; yaw as signs."""
+        x = np.array([rotor.x.value for rotor in self.rotor])
+        y = np.array([rotor.y.value for rotor in self.rotor])
+        arm = max(float(np.hypot(x, y).max()), 1e-300)
+        return np.array([np.ones(len(x)), y / arm, -x / arm, [_sign(rotor) for rotor in self.rotor]])
 
     def rotor_label(self, index: int) -> str:
         """A rotor in a message, by its number from 1 and its name if it has one; `index` counts from 0."""
@@ -218,26 +251,24 @@ class VehicleFile(Strict):
         return f"rotor {index + 1}" + (f" ('{name}')" if name else "")
 
     @property
-    def pairs(self) -> Pairs:
-        """Indices from 0 of the rotors that are opposite each other, or nearest to it; first the pair of rotor 1."""
-        return min(_PAIRINGS, key=self._unlike_pairs)
-
-    def _check_rank(self) -> PydanticCustomError | None:
-        # The yaw row is scaled by any length; only the rank counts.
-        x = np.array([rotor.x.value for rotor in self.rotor])
-        y = np.array([rotor.y.value for rotor in self.rotor])
-        arm = float(np.hypot(x, y).max())
-        sign = np.array([_sign(rotor) for rotor in self.rotor])
-        rows = np.array([np.ones(4), y / max(arm, 1e-300), x / max(arm, 1e-300), sign])
-        if np.linalg.svd(rows, compute_uv=False)[-1] < 1e-6:
-            message = "the four rotors cannot give thrust, roll, pitch and yaw independently; allowed: two pairs on"
-            return refusal("rotor", f"{message} different lines through the centre of mass")
+    def pairs(self) -> Opposite | None:
+        """The pairs of a quadrotor whose rotors are opposite in pairs that turn alike; None for any other frame."""
+        if len(self.rotor) != 4:
+            return None
+        for (one, partner), others in _PAIRINGS:
+            pairs = [(self.rotor[a], self.rotor[b]) for a, b in ((one, partner), others)]
+            off = [abs(p + q) for a, b in pairs for p, q in ((a.x.value, b.x.value), (a.y.value, b.y.value))]
+            alike = all(a.yaw == b.yaw for a, b in pairs) and pairs[0][0].yaw != pairs[1][0].yaw
+            if alike and max(off) <= BALANCE_TOLERANCE:
+                return Opposite((one, partner, *others))
         return None
 
     @property
     def thrust_to_weight(self) -> float:
         """Greatest thrust of all rotors over the weight."""
-        return 4.0 * self.rotor_gain.value * self.thrust_max.value / (self.mass.value * self.gravity.value)
+        return (
+            len(self.rotor) * self.rotor_gain.value * self.thrust_max.value / (self.mass.value * self.gravity.value)
+        )
 
     @property
     def vehicle(self) -> Vehicle:
@@ -258,6 +289,7 @@ class VehicleFile(Strict):
             linear_drag=self.linear_drag.value,
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
+            pairs=self.pairs or (),
         )
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:

@@ -67,7 +67,8 @@ def derived(data: FlightData, vehicle: Vehicle | None) -> FlightData:
         add(
             "thrust_believed", believed, "expected_thrust", "thrust of each rotor as believed, with its believed loss"
         )
-    if has("thrust_residual") and (residual := _of(data, "thrust_residual")).shape[1] == len(PerRotor.__slots__):
+    if has("thrust_residual"):
+        residual = _of(data, "thrust_residual")
         sound = np.asarray(second_best(PerRotor.of(residual.T)))
         add(
             "thrust_missing",

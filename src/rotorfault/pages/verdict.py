@@ -107,7 +107,7 @@ def _margin(data: FlightData) -> Fact | None:
         return None
     vehicle = file.vehicle
     loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
-    if loss.shape[1] != len(PerRotor.__slots__):
+    if loss.shape[1] != vehicle.rotors:
         return None
     wind: Array = np.asarray(data["wind"].values, dtype=float) if "wind" in data else np.zeros((len(loss), 3))
     margin = hover_margin(vehicle, PerRotor.of(loss.T), Vec3(*np.nan_to_num(wind).T))

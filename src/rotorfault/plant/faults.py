@@ -36,6 +36,7 @@ from rotorfault.maths.scalar import (
 )
 from rotorfault.model.block import Context, MemoryT, Nothing, ParametersT, TimeGrid
 from rotorfault.model.slot import Slot, register
+from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.plant.timed import Timed, rounded_share, share_since
 
 # Times are counted steps times a period, and may fall short of the time that was meant by rounding.
@@ -43,7 +44,7 @@ TIME_TOLERANCE = 1e-9  # s
 
 
 class RotorFault(NamedTuple):
-    """State of the four rotors at one time."""
+    """State of the rotors at one time."""
 
     effectiveness: PerRotor  # 1 sound .. 0 dead
     stuck: PerRotor  # 1 where the rotor does not follow its command; over a step, the share in which it does not
@@ -64,7 +65,7 @@ class Effect(NamedTuple):
 class OneRotor(Strict):
     """What every fault has: the rotor that it hits."""
 
-    rotor: int = Field(ge=1, le=4, description="number of the rotor, 1 to 4")
+    rotor: int = Field(ge=1, le=MOST_ROTORS, description="number of the rotor, from 1")
 
 
 class Fault(Timed[Effect, MemoryT, ParametersT]):
@@ -125,6 +126,7 @@ def rotor_faults(
     parameters: Sequence[Any],
     time: Scalar,
     dt: Scalar | None = None,
+    rotors: int = 4,
 ) -> RotorFault:
     """Combine all faults at one time, or over an integration step.
 
@@ -137,6 +139,8 @@ def rotor_faults(
         Since the start of the flight.
     dt : scalar, s, optional
         Length of the step that begins then; the time alone if not given.
+    rotors : int
+        Of the vehicle.
 
     Returns
     -------
@@ -144,9 +148,9 @@ def rotor_faults(
         Remaining effectiveness is a product; of several stuck faults of one rotor that are active, the last listed
         holds.
     """
-    effectiveness: list[Scalar] = [1.0] * 4
-    stuck: list[Scalar] = [0.0] * 4
-    thrust: list[Scalar] = [0.0] * 4
+    effectiveness: list[Scalar] = [1.0] * rotors
+    stuck: list[Scalar] = [0.0] * rotors
+    thrust: list[Scalar] = [0.0] * rotors
     for fault, memory, numbers in zip(faults, memories, parameters, strict=True):
         i = fault.rotor - 1
         effect = fault.at(time, memory, numbers) if dt is None else fault.over(time, dt, memory, numbers)

@@ -180,7 +180,7 @@ class Plant:
         dt: Scalar,
     ) -> PlantState:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
-        fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt)
+        fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt, parameters.vehicle.rotors)
         lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
         start, half, end = (self.residual_speed(output, fault, parameters) for output in lag.outputs)
         times, speeds = (time, time + 0.5 * dt, time + dt), (start - (start - end) * lag.sag, half, end)
@@ -296,7 +296,7 @@ class Plant:
 
     def fault(self, time: Scalar, held: Held, parameters: PlantParameters) -> RotorFault:
         """State of the rotors at a time in s."""
-        return rotor_faults(self.faults, held.faults, parameters.faults, time)
+        return rotor_faults(self.faults, held.faults, parameters.faults, time, rotors=parameters.vehicle.rotors)
 
     def true_loss(self, state: PlantState, held: Held, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """Lost share of each rotor's thrust by the faults of a time in s, with the rotors as they turn now."""

@@ -21,6 +21,7 @@ LOOKS = {
 }
 DISC = 0.27  # radius of a disc over the least distance of two rotors; the file does not say it
 SAME = 1e-3  # relative difference up to which two arms count as equally long
+MOST_LENGTHS = 3  # that are given: more would cover the picture
 OFF = 1.25  # distance of a length from its arm, over the radius of a disc
 
 
@@ -36,17 +37,23 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
     places = np.array([(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor])
     arms = np.hypot(*places.T)
     largest = float(arms.max())
-    apart = min(math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :])
-    radius = DISC * apart
-    for first, second in vehicle.pairs:
-        axes.plot(*places[[first, second], ::-1].T, color="0.8", linewidth=5.0, solid_capstyle="round", zorder=1)
+    between = [math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :]]
+    radius = DISC * min(x for x in between if x > SAME * largest)
+    for place in places:
+        ends = np.array([(0.0, 0.0), place])
+        axes.plot(*ends[:, ::-1].T, color="0.8", linewidth=5.0, solid_capstyle="round", zorder=1)
+    seen: list[Array] = []
     for number, (rotor, place) in enumerate(zip(vehicle.rotor, places, strict=True), start=1):
-        _draw_rotor(axes, number, rotor.yaw, place, radius)
+        below = sum(math.dist(place, other) <= SAME * largest for other in seen)
+        _draw_rotor(axes, number, rotor.yaw, place, radius, below)
+        seen.append(place)
     _draw_axes(axes, largest, radius)
-    # Of each pair the rotor that lies where the body axes are not: behind, or to the right.
-    one, other = (max(reversed(pair), key=lambda k: -places[k].sum()) for pair in vehicle.pairs)
-    for k in (one,) if abs(arms[one] - arms[other]) <= SAME * largest else (one, other):
-        _draw_length(axes, places[k], OFF * radius)
+    # Of arms of one length the rotor that lies where the body axes are not: behind, or to the right.
+    given: list[float] = []
+    for k in sorted(range(len(places)), key=lambda k: (places[k].sum(), k)):
+        if all(abs(arms[k] - length) > SAME * largest for length in given) and len(given) < MOST_LENGTHS:
+            given.append(float(arms[k]))
+            _draw_length(axes, places[k], OFF * radius)
     reach = np.abs(places).max(axis=0) + 1.45 * radius
     axes.set(xlim=(reach[1] * 1.15, -reach[1] * 1.15), ylim=(-reach[0], reach[0]), aspect="equal")
     axes.set_xlabel("y, left (m)")
@@ -60,11 +67,17 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
     return figure
 
 
-def _draw_rotor(axes: Axes, number: int, sign: str, place: Array, radius: float) -> None:
+def _draw_rotor(axes: Axes, number: int, sign: str, place: Array, radius: float, below: int) -> None:
+    """A rotor, inside those that sit at the same place before it."""
     colour = LOOKS[sign][0]
     x, y = float(place[0]), float(place[1])
-    axes.add_patch(Circle((y, x), radius, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2))
-    axes.text(y, x, str(number), ha="center", va="center", fontsize=12.0, color=BLACK, zorder=4)
+    radius *= 1.0 - 0.32 * below
+    axes.add_patch(Circle((y, x), radius, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2 + below))
+    # Numbers of coaxial rotors stand side by side.
+    axes.annotate(
+        str(number), (y, x), xytext=(-7.0 + 14.0 * below if below else 0.0, 0.0), textcoords="offset points",
+        ha="center", va="center", fontsize=12.0, color=BLACK, zorder=8,
+    )  # fmt: skip
     # Two open arcs inside the disc, each with a head; angles count from forward towards the left.
     for start in (0.25 * math.pi, 1.25 * math.pi):
         sweep = np.linspace(0.0, 0.6 * math.pi, 25) * (-1.0 if sign == "+" else 1.0) + start

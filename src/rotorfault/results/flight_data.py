@@ -99,16 +99,16 @@ def flight_data(layout: Layout, signals: Array, times: Array, attributes: dict[s
     """
     variables: dict[str, Variable] = {}
     for signal in layout.signals:
-        dims, shape = shape_of(signal.kind, signal.quantity.frame == RPY)
+        dims, shape = shape_of(signal.kind, signal.quantity.frame == RPY, layout.rotors)
         about = {"units": signal.quantity.unit, "long_name": signal.quantity.meaning}
         if signal.quantity.frame:
             about["frame"] = signal.quantity.frame
         values = signals[:, layout.place(signal.name)].reshape(len(times), *shape)
         variables[signal.name] = Variable(("time", *dims), values, about)
-    return FlightData(variables, _coordinates(times), attributes)
+    return FlightData(variables, _coordinates(times, layout.rotors), attributes)
 
 
-def _coordinates(times: Array) -> dict[str, Variable]:
+def _coordinates(times: Array, rotors: int) -> dict[str, Variable]:
     return {
         "time": Variable(("time",), times, {"units": "s", "long_name": "time since the start of the flight"}),
         "axis": Variable(("axis",), np.array(AXES), {}),
@@ -116,12 +116,14 @@ def _coordinates(times: Array) -> dict[str, Variable]:
         "angle_2": Variable(("angle_2",), np.array(ANGLES), {}),
         "component": Variable(("component",), np.array(COMPONENTS), {"long_name": "of a quaternion, scalar first"}),
         "rotor": Variable(
-            ("rotor",), np.arange(1, 5), {"long_name": "number of the rotor, in the order of the vehicle file"}
+            ("rotor",),
+            np.arange(1, rotors + 1),
+            {"long_name": "number of the rotor, in the order of the vehicle file"},
         ),
     }
 
 
-def shape_of(kind: Any, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]]:
+def shape_of(kind: Any, angular: bool, rotors: int) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names and sizes of the dimensions of a signal, besides the time.
 
     Parameters
@@ -130,13 +132,15 @@ def shape_of(kind: Any, angular: bool) -> tuple[tuple[str, ...], tuple[int, ...]
         Of the signal.
     angular : bool
         Whether its components are angles for people.
+    rotors : int
+        Of the vehicle.
     """
     if kind is Vec3:
         return ("angle" if angular else "axis",), (3,)
     if kind is Quat:
         return ("component",), (4,)
     if kind is PerRotor:
-        return ("rotor",), (4,)
+        return ("rotor",), (rotors,)
     if kind is Mat3:
         return ("angle", "angle_2"), (3, 3)
     return (), ()

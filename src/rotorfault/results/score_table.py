@@ -47,13 +47,19 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 GIVEN_UP = ("tilt", "thrust", "yaw")
-ROTORS = ("1", "2", "3", "4")
+FEWEST = 4  # rotors that a table has columns of, so that those of smaller vehicles can be joined with others
 LANDING = (
     "fault_time", "confirmed_time", "touch_down_time", "rotors_stopped_time", "speed", "horizontal_speed", "tilt",
     "distance",
 )  # fmt: skip
 
 Columns = dict[str, NDArray[Any]]
+
+
+def rotors_of(columns: Iterable[str]) -> list[int]:
+    """Numbers of the rotors that numbers of a flight are of, by the names of these."""
+    parts = (name.partition(".") for name in columns)
+    return sorted(int(number) for group, _, number in parts if group == "onset" and number.isdecimal())
 
 
 @final
@@ -174,7 +180,7 @@ def score_table(batch: Batch, state: Array) -> ScoreTable:
         table["lowest"] = scores.lowest
         table["reference_step"] = parameters.step
         # The first instant has no change before it.
-        rate = scores.variation / (len(ROTORS) * parameters.hover * np.maximum(scores.seen - 1.0, 1.0))
+        rate = scores.variation / (scoring.count_of_rotors * parameters.hover * np.maximum(scores.seen - 1.0, 1.0))
         table["command_step"], table["command_rate"] = rate, rate / dt
         table["saturated_fraction"] = scores.saturated * share
         table |= _named("given_up_fraction", GIVEN_UP, [x * share for x in scores.given_up])
@@ -221,15 +227,15 @@ def _detections(scoring: Scoring, scores: Scores, onsets: Sequence[Any], end_tim
     """Onsets and what came of them, by rotor; NaN for faults that begin after the end, and for sound rotors."""
     nothing = np.full(end_time.shape, np.nan)
     table: Columns = {}
-    for rotor in ROTORS:
-        hit = int(rotor) in scoring.rotors
-        onset = np.asarray(scoring.onset(int(rotor), tuple(onsets)), dtype=float) if hit else nothing
+    for rotor in range(1, max(FEWEST, scoring.count_of_rotors) + 1):
+        hit = rotor in scoring.rotors
+        onset = np.asarray(scoring.onset(rotor, tuple(onsets)), dtype=float) if hit else nothing
         begun = onset < end_time
         table[f"onset.{rotor}"] = np.where(begun, onset, np.nan)
         if not hit:
             table |= {f"{name}.{rotor}": nothing for name in ("detected", "loss_true", "loss_believed", "loss_error")}
             continue
-        detection = scores.detections[scoring.rotors.index(int(rotor))]
+        detection = scores.detections[scoring.rotors.index(rotor)]
         table[f"detected.{rotor}"] = np.where(detection.time < 0.0, np.nan, detection.time)
         table[f"loss_true.{rotor}"] = np.where(begun, detection.loss_true, np.nan)
         read = detection.read > 0.5
@@ -248,7 +254,7 @@ def _recovery(table: Columns, scores: Scores, steps: int, dt: NDArray[Any]) -> N
 
 def _first_onset(table: Columns) -> NDArray[Any]:
     """Time in s of the first onset of any fault; infinite where none began."""
-    onsets = np.stack([table[f"onset.{rotor}"] for rotor in ROTORS])
+    onsets = np.stack([table[f"onset.{rotor}"] for rotor in rotors_of(table)])
     return np.asarray(np.where(np.isnan(onsets), np.inf, onsets).min(axis=0))
 
 
@@ -302,7 +308,7 @@ def nested(row: Mapping[str, Any]) -> dict[str, Any]:
             summary[name] = value
     summary["detections"] = [
         {
-            "rotor": int(rotor),
+            "rotor": rotor,
             "true_time": row[f"onset.{rotor}"],
             "detected_time": row[f"detected.{rotor}"],
             "delay": row[f"detected.{rotor}"] - row[f"onset.{rotor}"],
@@ -310,7 +316,7 @@ def nested(row: Mapping[str, Any]) -> dict[str, Any]:
             "loss_estimated": row[f"loss_believed.{rotor}"],
             "loss_error": row[f"loss_error.{rotor}"],
         }
-        for rotor in ROTORS
+        for rotor in rotors_of(row)
         if np.isfinite(row[f"onset.{rotor}"])
     ]
     begun = np.isfinite(row.get("landing.confirmed_time", np.nan))

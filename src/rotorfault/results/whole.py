@@ -20,20 +20,20 @@ from rotorfault.loop.recorded import LoopSignals
 from rotorfault.loop.scores import ENDS, INTERRUPTED, SURVIVED
 from rotorfault.maths.arrays import ANGLES, AXES
 from rotorfault.model.telemetry import RPY, signals_of
+from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.results.flight_data import FlightData, shape_of
-from rotorfault.results.score_table import LANDING, ROTORS
+from rotorfault.results.score_table import FEWEST, LANDING, rotors_of
 
 HINT = "fly it again with 'rotorfault fly --repeat'"
 TEXTS = ("scenario", "controller", "plant", "engine", "version", "outcome", "scores")
 NUMBERS = ("seed", "end_time")
 """Attributes that the summary of a flight needs."""
 _OUTCOMES = (*SURVIVED, *ENDS[1:], INTERRUPTED)
+PER_ROTOR = ("onset", "detected", "loss_true", "loss_believed", "loss_error")
 COUNTED = (
     *(f"settle_time.{name}" for name in (*AXES, "overall")),
     *(f"{group}.{axis}" for group in ("position_mse", "position_error_end") for axis in AXES),
     *(f"{group}.{angle}" for group in ("attitude_mse", "attitude_end") for angle in ANGLES),
-    *(f"{name}.{rotor}" for name in ("onset", "detected", "loss_true", "loss_believed", "loss_error")
-      for rotor in ROTORS),
     "end_time", "cost", "tilt_max", "command_rate", "command_step", "saturated_fraction", "recovery_time",
     "excursion", "altitude_lost", "reference_step", "false_alarms",
 )  # fmt: skip
@@ -63,11 +63,12 @@ def _signals(data: FlightData) -> Iterator[str]:
     if (np.diff(times) <= 0.0).any():
         yield "signal 'time' does not rise"
     known = {signal.name for signal in signals_of(LoopSignals)}
+    rotors = np.shape(data["rotor"].values)[0] if "rotor" in data else FEWEST
     for signal in signals_of(LoopSignals):
         if signal.name not in data.variables:
             yield f"signal '{signal.name}' is missing"
             return
-        dims, shape = shape_of(signal.kind, signal.quantity.frame == RPY)
+        dims, shape = shape_of(signal.kind, signal.quantity.frame == RPY, rotors)
         here, wanted = data[signal.name], (len(times), *shape)
         if here.dims != ("time", *dims) or np.shape(here.values) != wanted:
             yield f"signal '{signal.name}' has the shape {np.shape(here.values)} along {here.dims}; allowed: {wanted}"
@@ -111,7 +112,9 @@ def scores(attributes: Mapping[str, Any], path: str | Path) -> dict[str, Any]:
     """
     found = json_table(attributes, "scores", path)
     landing = [f"landing.{name}" for name in LANDING] if "landing.confirmed_time" in found else []
-    for name in ("outcome", "survived", *COUNTED, *landing):
+    rotors = range(1, max([FEWEST, *rotors_of(found)]) + 1)
+    each = [f"{name}.{rotor}" for name in PER_ROTOR for rotor in rotors] if len(rotors) <= MOST_ROTORS else []
+    for name in ("outcome", "survived", *COUNTED, *each, *landing):
         if name not in found:
             raise InputError(f"{path}: attribute 'scores' lacks '{name}'; {HINT}")
     for name, value in found.items():

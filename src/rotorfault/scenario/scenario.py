@@ -27,6 +27,7 @@ from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.part import Part, field_of
@@ -197,6 +198,14 @@ class Scenario(Strict):
                 f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
             )
         require_flyable(self.mismatch.applied(self.vehicle), self.grid)
+        count = len(self.vehicle.rotor)
+        for number, fault in enumerate(self.all(FAULT)):
+            hit = getattr(fault.settings, "rotor", 1)
+            if not 1 <= hit <= count:
+                raise refusal(
+                    f"fault.{number}.rotor",
+                    f"got {hit}; allowed: 1 to {count}, the rotors of '{cut(self.vehicle.name)}'",
+                )
         for slot in SLOTS:
             if slot.many:
                 for number, part in enumerate(self.all(slot)):

@@ -43,10 +43,11 @@ def require_flyable(vehicle: Vehicle, grid: TimeGrid) -> None:
         With the number, and the step that would do.
     """
     J, thrust = vehicle.inertia, vehicle.rotor_gain * vehicle.thrust_max
-    lever = [sum(map(abs, vehicle.rotor_y)) / 2.0, sum(map(abs, vehicle.rotor_x)) / 2.0, 2.0 * vehicle.torque_ratio]
-    speed = 2.0 * math.sqrt(thrust / vehicle.thrust_coefficient)
+    half = vehicle.rotors / 2.0
+    lever = [sum(map(abs, vehicle.rotor_y)) / 2.0, sum(map(abs, vehicle.rotor_x)) / 2.0, half * vehicle.torque_ratio]
+    speed = half * math.sqrt(thrust / vehicle.thrust_coefficient)
     turning = max(_over(arm * thrust, moment) for arm, moment in zip(lever, J, strict=True))
-    decay, pushed = _over(vehicle.linear_drag, vehicle.mass), _over(4.0 * thrust, vehicle.mass)
+    decay, pushed = _over(vehicle.linear_drag, vehicle.mass), _over(vehicle.rotors * thrust, vehicle.mass)
     precession = _over(vehicle.rotor_inertia * speed, math.sqrt(J.x) * math.sqrt(J.y))
     found = (
         (f"its drag over mass is {decay:.4g} 1/s", _most(FASTEST_DECAY, decay)),

@@ -27,8 +27,8 @@ from rotorfault.autopilot.diagnosis.stuck import StuckParameters
 from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Diagnosis
-from rotorfault.model.vehicle import hover_thrust
 from rotorfault.model.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]

@@ -19,8 +19,9 @@ from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.block import Context, Nothing
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Command, Estimate, motion_of
-from rotorfault.model.vehicle import Vehicle, hover_thrust, residual_speed, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import FAULT, WIND, Air, Plant, PlantParameters, PlantState, RigidBody
 from rotorfault.plant.plant import Held

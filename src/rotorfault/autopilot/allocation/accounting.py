@@ -10,13 +10,15 @@ with the rotor gain k. The unallocated wrench is the demanded one less the wrenc
 from __future__ import annotations
 
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, absolute, either, less_equal, negated
+from rotorfault.maths.scalar import Scalar, absolute, either, less_equal, negated, sqrt
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import pair_demand
 from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
 
 TOLERANCE = 1e-9  # of the largest rotor command: below it a difference is rounding
+TOLERANCE_OF_STEPS = 1e-6  # the same where allocation comes near in steps (`nearest`)
 
 
 def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: PerRotor) -> Allocation:
@@ -36,25 +38,26 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
     -------
     Allocation
         An axis counts as given up when more than `TOLERANCE` of the largest rotor command is missing or too much,
-        measured in rotor thrust; NaN counts as given up.
+        measured in rotor thrust (each row of the effectiveness brought to length 1); NaN counts as given up.
     """
     given = wrench_of(vehicle, _given(vehicle, diagnosis, command))
     unallocated = Wrench(wrench.thrust - given.thrust, wrench.torque_B - given.torque_B)
-    missing = pair_demand(vehicle, unallocated)
-    tolerance = TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
+    share = TOLERANCE if vehicle.pairs != () else TOLERANCE_OF_STEPS
+    tolerance = share * vehicle.rotor_gain * vehicle.thrust_max
 
     def beyond(x: Scalar) -> Scalar:
         return negated(less_equal(absolute(x), tolerance))
 
-    return Allocation(
-        command=command,
-        unallocated=unallocated,
-        given_up=Vec3(
-            either(beyond(missing.D12), beyond(missing.D34)),
-            beyond(missing.S12 + missing.S34),
-            beyond(missing.S12 - missing.S34),
-        ),
-    )
+    if vehicle.pairs != ():
+        missing = pair_demand(vehicle, unallocated)
+        first, second = missing.D12, missing.D34
+        thrust, yaw = missing.S12 + missing.S34, missing.S12 - missing.S34
+    else:
+        rows = effectiveness(vehicle)
+        thrust, first, second, yaw = (
+            x / sqrt(row.dot(row)) for x, row in zip((unallocated.thrust, *unallocated.torque_B), rows, strict=True)
+        )
+    return Allocation(command, unallocated, Vec3(either(beyond(first), beyond(second)), beyond(thrust), beyond(yaw)))
 
 
 def direct(vehicle: Vehicle, diagnosis: Diagnosis, command: PerRotor) -> tuple[Wrench, Allocation]:

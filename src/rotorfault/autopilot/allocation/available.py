@@ -6,24 +6,28 @@ order of pairs, see `mixer`)
     S12 = 2 min(H1, H2),   S34 = 2 min(H3, H4)
 
 so the thrust is at most 2 min(S12, S34) with yaw in balance and S12 + S34 with yaw given up. Position control that
-asks for more loses yaw, and on a vehicle with a small yaw inertia then spins within a fraction of a second.
+asks for more loses yaw, and on a vehicle with a small yaw inertia then spins within a fraction of a second. On other
+frames both are found by active sets (see `nearest`), from rotors at their least thrust upwards.
 """
 
 from __future__ import annotations
 
+from rotorfault.autopilot.allocation.nearest import limits_of, most_thrust
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import in_pairs
 from rotorfault.model.motion import effect_of
-from rotorfault.model.signals import FOLLOWING, Stuck
+from rotorfault.model.signals import Stuck, following
 from rotorfault.model.vehicle import Vehicle
 
 # Of the weight: thrust for which yaw is given up where it cannot be had in balance. Our choice: a fifth above the
 # weight stops a fall; more would give yaw up sooner, less could not climb back.
 HOVER_RESERVE = 1.2
+STEPS = 3  # of active sets, for each of the two: a rotor that comes to its limit takes one
 
 
-def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING) -> Scalar:
+def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = None) -> Scalar:
     """Largest total thrust in N that position control should ask for.
 
     Parameters
@@ -31,8 +35,8 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING)
     vehicle : Vehicle
     loss : PerRotor
         Believed loss of each rotor.
-    stuck : Stuck
-        Rotors that are believed not to follow; their loss is not looked at.
+    stuck : Stuck, optional
+        Rotors that are believed not to follow; their loss is not looked at. None if not given.
 
     Returns
     -------
@@ -40,7 +44,15 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck = FOLLOWING)
         In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
         this as there is with yaw given up.
     """
-    most = in_pairs(vehicle, effect_of(vehicle, loss, stuck) * vehicle.thrust_max + stuck.thrust)
+    stuck = following(vehicle.rotors) if stuck is None else stuck
+    effect = effect_of(vehicle, loss, stuck)
+    high = effect * vehicle.thrust_max + stuck.thrust
+    if vehicle.pairs == ():
+        share = effect * (1.0 / vehicle.rotor_gain)
+        limits = limits_of(effect * vehicle.thrust_min + stuck.thrust, high, share)
+        with_yaw, without_yaw = most_thrust(effectiveness(vehicle), limits, STEPS)
+        return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
+    most = in_pairs(vehicle, high)
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
     with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
     return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

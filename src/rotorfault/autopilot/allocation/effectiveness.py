@@ -1,5 +1,7 @@
 """Allocation with the believed effectiveness and the rotor limits, in strict order: tilt, then thrust, then yaw.
 
+What follows is for two opposite pairs of rotors; for other frames see `rotorfault.autopilot.allocation.nearest`.
+
 Rotor i can give any thrust in [lo_i, hi_i] = (1 - loss_i) k [c_min, c_max]. In the sums and differences of the two
 rotor pairs, numbered in their order (see `mixer`), the lexicographic optimum
 
@@ -34,13 +36,15 @@ from typing import NamedTuple, final
 from pydantic import Field
 
 from rotorfault.autopilot.allocation.accounting import account
+from rotorfault.autopilot.allocation.nearest import limits_of, nearest
 from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, absolute, clip, either, less, maximum, minimum, select, sqrt
 from rotorfault.model.block import Context, Nothing, Record
-from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, pair_demand, rotor_thrusts
+from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, nominal_inverse, pair_demand, rotor_thrusts
 from rotorfault.model.motion import effect_of, limited
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import register
@@ -87,7 +91,7 @@ def allocated(
     Parameters
     ----------
     vehicle : Vehicle
-        As believed, with two opposite pairs of rotors.
+        As believed.
     wrench : Wrench
         Demanded thrust [N] and torque [N m, body axes].
     diagnosis : Diagnosis
@@ -104,18 +108,39 @@ def allocated(
     low = effect * least + stuck.thrust
     high = dead.map(select, low, effect * vehicle.thrust_max + stuck.thrust)
 
+    if vehicle.pairs == ():
+        share = stuck.effectiveness(diagnosis.loss)
+        limits = limits_of(low, high, dead.map(lambda is_dead, e: select(is_dead, 0.0, e), share))
+        thrust = nearest(effectiveness(vehicle), wrench, limits)
+        asked = nominal_inverse(vehicle, wrench) / vehicle.rotor_gain
+        return _commanded(vehicle, wrench, diagnosis, Steady(thrust, low, effect, least, dead), asked)
     demand = pair_demand(vehicle, wrench)
     in_order = in_pairs(vehicle, low), in_pairs(vehicle, high)
     spinning = yielding(vehicle, in_pairs(vehicle, diagnosis.flagged), spin)
     pairs = attainable_nearest(demand, *in_order, spinning)
     thrust = from_pairs(vehicle, rotor_thrusts(pairs)).map(clip, low, high)
 
-    # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
-    divisor = dead.map(lambda is_dead, e: select(is_dead, 1.0, e), effect)
-    followed = (thrust - low) / divisor + least
-    # What a stuck rotor is told does nothing, if it is stuck: so it is told what would be right if it were not.
     asked = from_pairs(vehicle, rotor_thrusts(demand)) / vehicle.rotor_gain
-    command = limited(vehicle, stuck.rotor.map(select, asked, followed))
+    return _commanded(vehicle, wrench, diagnosis, Steady(thrust, low, effect, least, dead), asked)
+
+
+class Steady(NamedTuple):
+    """Thrusts that rotors are to give, and how commands become thrusts."""
+
+    thrust: PerRotor  # N
+    low: PerRotor  # N: what the least command gives
+    effect: PerRotor  # thrust per command
+    least: PerRotor  # N: command
+    dead: PerRotor  # 1 where the rotor counts as dead
+
+
+def _commanded(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, steady: Steady, asked: PerRotor) -> Allocation:
+    """Commands that give thrusts, and `asked` [N] of stuck rotors."""
+    # Measured from the lower end, so that a dead rotor gets exactly thrust_min, yet NaN still comes through.
+    divisor = steady.dead.map(lambda is_dead, e: select(is_dead, 1.0, e), steady.effect)
+    followed = (steady.thrust - steady.low) / divisor + steady.least
+    # What a stuck rotor is told does nothing, if it is stuck: so it is told what would be right if it were not.
+    command = limited(vehicle, diagnosis.stuck.rotor.map(select, asked, followed))
     return account(vehicle, wrench, diagnosis, command)
 
 

@@ -31,6 +31,7 @@ from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.effectiveness import Effectiveness, allocated
 from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
+from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, both, clip, either, select
@@ -61,7 +62,18 @@ class PaperRule(Allocator[Nothing, PaperRuleParameters]):
         )
 
     def parameters(self, context: Context) -> PaperRuleParameters:
-        """Numbers of the fallback."""
+        """Numbers of the fallback.
+
+        Raises
+        ------
+        InputError
+            If the vehicle has no two opposite pairs of rotors.
+        """
+        if context.vehicle.pairs == ():
+            raise InputError(
+                "allocation: paper_rule is for quadrotors whose rotors are opposite in pairs, as (41)-(44) are; "
+                "allowed for this vehicle: effectiveness, nominal"
+            )
         return PaperRuleParameters(self.settings.fallback.effectiveness_min)
 
     def step(

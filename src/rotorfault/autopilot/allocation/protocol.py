@@ -20,7 +20,7 @@ class AllocationInputs(NamedTuple):
 
     wrench: Wrench  # demanded thrust [N] and torque [N m, body axes]
     diagnosis: Diagnosis  # believed
-    vehicle: Vehicle  # belief, with two opposite pairs of rotors (see `rotorfault.model.mixer`)
+    vehicle: Vehicle  # belief
     command: PerRotor  # N, sent at the last instant
     spin: Scalar = 0.0  # rad/s: estimated yaw rate of the body
 

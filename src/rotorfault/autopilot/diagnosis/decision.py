@@ -57,9 +57,9 @@ from rotorfault.maths.scalar import (
     select,
     sqrt,
 )
-from rotorfault.model.mixer import from_pairs, in_pairs
+from rotorfault.model.mixer import from_pairs, hover_thrust, in_pairs
 from rotorfault.model.signals import Diagnosis
-from rotorfault.model.vehicle import Vehicle, hover_thrust
+from rotorfault.model.vehicle import Vehicle
 
 # Of F_max: below it a thrust is no measure for a loss. Our choice: an error of 1 % of F_max then reads as a loss of
 # 0.2 at most.
@@ -128,7 +128,7 @@ class Evidence(NamedTuple):
     residual: PerRotor  # thrust estimated less that of a sound rotor
     thrust: PerRotor  # of a sound rotor
     model_error: Misstated  # N^2: squares of what a wrong model may show as missing thrust
-    noise: Scalar  # standard deviation of the difference of two residuals
+    noise: PerRotor  # standard deviation of the difference of its residual from another's
 
 
 def decision_parameters(settings: DecisionSettings, test_time: float, stuck: StuckParameters) -> DecisionParameters:
@@ -157,10 +157,10 @@ def decision_parameters(settings: DecisionSettings, test_time: float, stuck: Stu
     )
 
 
-def undecided() -> DecisionMemory:
-    """Nothing seen yet."""
-    none = PerRotor.all(0.0)
-    return DecisionMemory(none, none, none, none, none, nobody_judged())
+def undecided(rotors: int = 4) -> DecisionMemory:
+    """Nothing seen yet, of so many rotors."""
+    none = PerRotor.all(0.0, rotors)
+    return DecisionMemory(none, none, none, none, none, nobody_judged(rotors))
 
 
 def second_best(residual: PerRotor) -> Scalar:
@@ -171,6 +171,11 @@ def second_best(residual: PerRotor) -> Scalar:
     residual : PerRotor
         N: estimated thrust less the thrust of a sound rotor.
     """
+    if len(residual) != 4:
+        best, second = maximum(residual[0], residual[1]), minimum(residual[0], residual[1])
+        for r in [*residual][2:]:
+            best, second = maximum(best, r), maximum(second, minimum(best, r))
+        return second
     r1, r2, r3, r4 = residual
     # Of the two winners the lower one, or the loser of the higher one's pair.
     runner_up = minimum(maximum(r1, r2), maximum(r3, r4))
@@ -227,8 +232,7 @@ def decide(
     p, sound = parameters, second_best(evidence.residual)
     per_thrust = _per_thrust(evidence.thrust, vehicle)
     losses = _loss(sound, evidence.residual, per_thrust)
-    hover, least = hover_thrust(vehicle).r1, SMALL_THRUST * vehicle.thrust_max
-    noise = p.noise * evidence.noise
+    hover, least = hover_thrust(vehicle).sum() / vehicle.rotors, SMALL_THRUST * vehicle.thrust_max
     excess = evidence.residual.reduce(maximum) - sound
     # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
     half = 0.5 * dt
@@ -242,12 +246,13 @@ def decide(
         at_fault: Scalar,
         f: Scalar,
         over_f: Scalar,
+        noise: Scalar,
         any_: Scalar,
         beside: Scalar,
         was: DecisionMemory,
     ) -> tuple[Scalar, ...]:
         off, large = sound - r, maximum(f, hover)
-        base = maximum(p.threshold * large, noise)
+        base = maximum(p.threshold * large, p.noise * noise)
         # No pair is a measure while a rotor gives too much, for what that does to the others is in no model; nor is a
         # partner at fault.
         behind, near = maximum(partner - r, 0.0), base * base + beside
@@ -284,8 +289,20 @@ def decide(
         r1, r2, r3, r4 = in_pairs(vehicle, values)
         return from_pairs(vehicle, PerRotor(r2, r1, r4, r3))
 
-    partners, at_fault = opposite(evidence.residual), opposite(memory.flagged)
-    known = (evidence.residual, partners, at_fault, evidence.thrust, per_thrust, *evidence.model_error)
+    if vehicle.pairs != ():
+        partners, at_fault = opposite(evidence.residual), opposite(memory.flagged)
+    else:  # no rotor has a partner, so none is better than the second best
+        partners, at_fault = evidence.residual, PerRotor.all(1.0, vehicle.rotors)
+
+    known = (
+        evidence.residual,
+        partners,
+        at_fault,
+        evidence.thrust,
+        per_thrust,
+        evidence.noise,
+        *evidence.model_error,
+    )
     rows = zip(losses, *known, before, strict=True)
     columns = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
     threshold, test, since, below, flagged, smoothed, tested = columns

@@ -41,14 +41,17 @@ from rotorfault.autopilot.diagnosis.decision import (
 )
 from rotorfault.autopilot.diagnosis.model_error import (
     Dynamics,
+    Misstated,
     ModelErrorMemory,
     follow,
     misstated,
     noise_gain,
     noise_of,
     nothing_shown,
+    torque_variances,
 )
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+from rotorfault.autopilot.diagnosis.signature import explained
 from rotorfault.autopilot.diagnosis.stuck import StuckParameters
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
@@ -56,6 +59,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.block import Context, Record
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.motion import drag_acceleration, torque_of_motion
 from rotorfault.model.signals import Diagnosis, Wrench
@@ -190,9 +194,9 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             0.0,
             zeros(),
             0.0,
-            nothing_shown(),
-            undecided(),
-            PerRotor.all(0.0),
+            nothing_shown(inputs.vehicle.rotors),
+            undecided(inputs.vehicle.rotors),
+            PerRotor.all(0.0, inputs.vehicle.rotors),
         )
 
     def step(
@@ -212,14 +216,9 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
         delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
-        residual = nominal_inverse(vehicle, Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega)))
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
-        evidence = Evidence(
-            residual,
-            inputs.expectation.thrust,
-            misstated(wrong, memory.decision.flagged, parameters.decision.model, vehicle),
-            noise_of(wrong, vehicle, dynamics),
-        )
+        deviation = Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega))
+        evidence = self._evidence(deviation, wrong, memory.decision.flagged, inputs, parameters)
         decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, dt)
         after = LuenbergerMemory(
             climb=climb + dynamics.gain_rate * innovation_z,
@@ -232,6 +231,26 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             stuck=diagnosis.stuck.rotor,
         )
         return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test, diagnosis.stuck.thrust)
+
+    @staticmethod
+    def _evidence(
+        deviation: Wrench,
+        wrong: ModelErrorMemory,
+        flagged: PerRotor,
+        inputs: DiagnosisInputs,
+        parameters: LuenbergerParameters,
+    ) -> Evidence:
+        """What the deviation from the believed wrench says of each rotor."""
+        vehicle, thrust, shares = inputs.vehicle, inputs.expectation.thrust, parameters.decision.model
+        if vehicle.pairs != ():
+            noise = PerRotor.all(noise_of(wrong, vehicle, parameters.dynamics), vehicle.rotors)
+            residual = nominal_inverse(vehicle, deviation)
+            return Evidence(residual, thrust, misstated(wrong, flagged, shares, vehicle), noise)
+        noisy, uncertain = torque_variances(wrong, flagged, shares, vehicle, parameters.dynamics)
+        most, apart = vehicle.rotor_gain * vehicle.thrust_max, parameters.decision.noise
+        rows = effectiveness(vehicle)
+        found = explained(rows, deviation.torque_B, noisy, uncertain, flagged, most, apart)
+        return Evidence(found.residual, thrust, Misstated(found.model_error, found.model_error), found.noise)
 
     def _model(self, inputs: DiagnosisInputs) -> tuple[Scalar, Scalar, Vec3]:
         """(cosine of the tilt, vertical acceleration, angular acceleration) of a sound vehicle, period's mean."""

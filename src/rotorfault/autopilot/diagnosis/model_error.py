@@ -38,7 +38,7 @@ from rotorfault.maths.scalar import Scalar, absolute, less, maximum, minimum, sq
 from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
 from rotorfault.model.motion import limited
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds, wrench_of
 
 SPEED_SHARE = -0.3  # of the bandwidth, for rotor speeds: slower rotors, for there the root is steeper
 NOISE_MEMORY = 0.5  # s: long beside a fault's onset, which is no noise; short beside a change of the weather
@@ -103,9 +103,9 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
     return math.sqrt(deviations / innovations)
 
 
-def nothing_shown() -> ModelErrorMemory:
-    """Before the first instant."""
-    none, still = PerRotor.all(0.0), zeros()
+def nothing_shown(rotors: int = 4) -> ModelErrorMemory:
+    """Before the first instant, of so many rotors."""
+    none, still = PerRotor.all(0.0, rotors), zeros()
     return ModelErrorMemory(none, none, none, still, still, still, still, 0.0, 0.0, 0.0, none, none, 0.0, still)
 
 
@@ -196,10 +196,7 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
         As believed.
     """
     inertia = vehicle.inertia
-    others = Vec3(inertia.y + inertia.z, inertia.z + inertia.x, inertia.x + inertia.y)
-    turning, product = inertia.times(memory.turning), others.times(memory.product)
-    # Errors of the axes are independent: their sizes add, however they share out over the arms.
-    torque = Vec3(*(shares.inertia * (absolute(a) + absolute(b)) for a, b in zip(turning, product, strict=True)))
+    torque = _by_inertia(memory, shares, vehicle)
     roll, pitch, yaw = _unit_torques(vehicle)
     arm_12 = absolute(roll.D12) * torque.x + absolute(pitch.D12) * torque.y
     arm_34 = absolute(roll.D34) * torque.x + absolute(pitch.D34) * torque.y
@@ -219,6 +216,44 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
     first, second = arm_12 * arm_12, arm_34 * arm_34
     beside = from_pairs(vehicle, PerRotor(first, first, second, second))
     return Misstated(any_other, lagged + beside)
+
+
+def _by_inertia(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Vec3:
+    """Torque in N m about each axis that a wrong inertia may show."""
+    inertia = vehicle.inertia
+    others = Vec3(inertia.y + inertia.z, inertia.z + inertia.x, inertia.x + inertia.y)
+    turning, product = inertia.times(memory.turning), others.times(memory.product)
+    # Errors of the axes are independent: their sizes add, however they share out over the arms.
+    return Vec3(*(shares.inertia * (absolute(a) + absolute(b)) for a, b in zip(turning, product, strict=True)))
+
+
+def torque_variances(
+    memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehicle: Vehicle, dynamics: Dynamics
+) -> tuple[Vec3, Vec3]:
+    """Variances in (N m)^2 of the observed torque about the body axes: by noise, and by a wrong model.
+
+    Parameters
+    ----------
+    memory : ModelErrorMemory
+    flagged : PerRotor
+        1 for a rotor that may be at fault; see `misstated`.
+    shares : Shares
+    vehicle : Vehicle
+        As believed.
+    dynamics : Dynamics
+    """
+    inertia = vehicle.inertia
+    squared = inertia.times(inertia) * (dynamics.noise_gain * dynamics.noise_gain)
+    lagging = wrench_of(vehicle, memory.lagging).torque_B
+    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    own = Vec3(0.0, 0.0, inertia.z * unlike)
+    reacted = Vec3(0.0, 0.0, inertia.z * absolute(memory.reacting))
+    wrong = [
+        a + b + shares.bandwidth * (absolute(c) + d)
+        for a, b, c, d in zip(_by_inertia(memory, shares, vehicle), own, lagging, reacted, strict=True)
+    ]
+    noise = memory.noise.map(lambda x: maximum(x, 0.0))
+    return squared.times(noise), Vec3(*(x * x for x in wrong))
 
 
 def noise_of(memory: ModelErrorMemory, vehicle: Vehicle, dynamics: Dynamics) -> Scalar:

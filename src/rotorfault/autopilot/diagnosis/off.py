@@ -20,4 +20,4 @@ class Off(Diagnoser[Nothing, Nothing]):
         self, memory: Nothing, inputs: DiagnosisInputs, parameters: Nothing, dt: Scalar
     ) -> tuple[Nothing, Diagnosis, Record]:
         """Blame nobody."""
-        return memory, healthy(), Nothing()
+        return memory, healthy(inputs.vehicle.rotors), Nothing()

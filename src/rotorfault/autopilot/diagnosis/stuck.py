@@ -73,9 +73,9 @@ class Seen(NamedTuple):
     flagged: PerRotor  # 1 where a fault is declared
 
 
-def nobody_judged() -> StuckMemory:
-    """Before the first instant."""
-    return StuckMemory(PerRotor.all(0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+def nobody_judged(rotors: int = 4) -> StuckMemory:
+    """Before the first instant, of so many rotors."""
+    return StuckMemory(PerRotor.all(0.0, rotors), 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def judged(
@@ -97,14 +97,14 @@ def judged(
     """
     still = memory.judged.map(both, seen.flagged)
     kept = still.reduce(either)
-    f1, f2, f3, f4 = seen.flagged
-    sound = negated(f1), negated(either(f1, f2)), negated(either(either(f1, f2), f3))
-    first = PerRotor(f1, both(f2, sound[0]), both(f3, sound[1]), both(f4, sound[2]))
+    first = _first(seen.flagged)
     which = still.map(lambda old, new: select(kept, old, new), first)
 
     def of_it(values: PerRotor) -> Scalar:
-        r1, r2, r3, r4 = values
-        return select(which.r1, r1, select(which.r2, r2, select(which.r3, r3, r4)))
+        *others, chosen = values
+        for one, value in zip([*which][-2::-1], others[::-1], strict=True):
+            chosen = select(one, value, chosen)
+        return chosen
 
     thrust = of_it(seen.thrust)
     late = select(kept, memory.late + (thrust - memory.late) * (dt / (parameters.lateness + dt)), thrust)
@@ -123,9 +123,18 @@ def judged(
     g = clip(product / maximum(square, 1e-9 * bar), 0.0, 1.0)
     missed = given * given - g * (2.0 * product - g * square)
     known = less(seen.flagged.sum(), 2.5)
-    of_use = less(given, (2.0 / HOVER_RESERVE) * hover)
+    of_use = less(given, (0.5 * len(seen.thrust) / HOVER_RESERVE) * hover)
     is_stuck = both(both(settled, both(known, of_use)), less(bar, missed))
     stuck = which.map(lambda it: both(it, is_stuck))
     held = maximum(given, 0.0)
     after = StuckMemory(which, since, late, given, product, square)
     return after, Stuck(stuck, stuck.map(lambda on: select(on, held, 0.0)))
+
+
+def _first(flagged: PerRotor) -> PerRotor:
+    """1 for the first rotor that is flagged."""
+    first, before = [flagged[0]], flagged[0]
+    for flag in [*flagged][1:]:
+        first.append(both(flag, negated(before)))
+        before = either(before, flag)
+    return PerRotor.of(first)

@@ -51,7 +51,7 @@ from rotorfault.maths.scalar import (
     sqrt,
 )
 from rotorfault.model.block import Context, Record
-from rotorfault.model.signals import Diagnosis, Reference, Stuck
+from rotorfault.model.signals import Diagnosis, Reference, Stuck, following
 from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
 
@@ -136,8 +136,11 @@ class Land(Response[LandMemory, LandParameters]):
 
     def initial(self, inputs: ResponseInputs, parameters: LandParameters) -> LandMemory:
         """No fault seen yet."""
-        none = PerRotor.all(0.0)
-        return LandMemory(0.0, 0.0, 0.0, 0.0, none, none, Stuck(), 0.0, 0.0, inputs.estimate.p_W, zeros(), 0.0)
+        rotors = inputs.vehicle.rotors
+        none = PerRotor.all(0.0, rotors)
+        return LandMemory(
+            0.0, 0.0, 0.0, 0.0, none, none, following(rotors), 0.0, 0.0, inputs.estimate.p_W, zeros(), 0.0
+        )
 
     def _believed(self, memory: LandMemory, diagnosis: Diagnosis) -> Diagnosis:
         """The last belief on the ground, or on what may be the ground; else the new one."""

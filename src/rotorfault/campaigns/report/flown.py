@@ -186,7 +186,7 @@ def _vehicles(study: Study, names: Collection[str]) -> list[str]:
 
 def _vehicle(file: VehicleFile, mismatch: Mismatch) -> str:
     vehicle = file.vehicle
-    lift = vehicle.thrust_max * vehicle.rotor_gain * 4.0 / (vehicle.mass * vehicle.gravity)
+    lift = vehicle.thrust_max * vehicle.rotor_gain * vehicle.rotors / (vehicle.mass * vehicle.gravity)
     text = f"{file.name}: {vehicle.mass:.3g} kg, thrust-to-weight ratio {lift:.3g}"
     text += f"; {file.description}" if file.description else ""
     other = {

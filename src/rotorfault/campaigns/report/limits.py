@@ -132,7 +132,7 @@ def _physics(scenario: Scenario, varied: Columns, count: int) -> Physics | None:
 
 def _physics_of(group: Group) -> Physics | None:
     loop, numbers = numbers_of(group)
-    remaining: list[Any] = [1.0] * 4
+    remaining: list[Any] = [1.0] * loop.rotors
     for fault, record in zip(loop.plant.faults, numbers.parts.fault if loop.plant.faults else (), strict=True):
         loss = fault.final_loss(record)
         if loss is None:

@@ -1,0 +1,88 @@
+r"""The effectiveness matrix B of any multirotor, and its pseudo-inverse.
+
+.. math:: w = B F, \qquad w = (T, \tau_x, \tau_y, \tau_z)
+
+Row by row B holds what a newton of each rotor adds to thrust, roll, pitch and yaw torque. Its pseudo-inverse
+
+.. math:: B^+ = B^T (B B^T)^{-1}
+
+gives, of all thrusts with a wrench, those with the least sum of squares. The rows are brought to length 1 first, and
+the 4x4 matrix is then factored as L D L^T. An axis that no rotors reach, or that another axis gives already (a flat
+tricopter has no yaw of its own), has a pivot of 0; it is held at `LEAST_PIVOT`, and demands on it are met as far as
+they can be.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rotorfault.base.one_line import record_line
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, maximum, sqrt
+from rotorfault.model.signals import Wrench
+from rotorfault.model.vehicle import Vehicle
+
+# Of a row of length 1, squared: what is left of it beside the others. A frame that the vehicle file allows has 1e-6.
+LEAST_PIVOT = 1e-9
+
+
+class WrenchRows(NamedTuple):
+    """A 4 x N matrix with a column for each rotor: the effectiveness, or its transposed pseudo-inverse."""
+
+    thrust: PerRotor
+    roll: PerRotor
+    pitch: PerRotor
+    yaw: PerRotor
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+    def times(self, wrench: Wrench) -> PerRotor:
+        """The transposed matrix times a wrench: a sum of the rows."""
+        x, y, z = wrench.torque_B
+        rows: PerRotor = self.thrust * wrench.thrust + self.roll * x + self.pitch * y + self.yaw * z
+        return rows
+
+    def wrench(self, thrust: PerRotor) -> Wrench:
+        """The matrix times one number per rotor, as thrusts in N."""
+        return Wrench(self.thrust.dot(thrust), Vec3(*(row.dot(thrust) for row in (self.roll, self.pitch, self.yaw))))
+
+
+def effectiveness(vehicle: Vehicle) -> WrenchRows:
+    """B: thrust [N], and torque [N m] about the body axes, of a newton of each rotor."""
+    return WrenchRows(
+        PerRotor.all(1.0, vehicle.rotors),
+        vehicle.rotor_y,
+        -vehicle.rotor_x,
+        vehicle.rotor_yaw_sign * vehicle.torque_ratio,
+    )
+
+
+def pseudo_inverse(matrix: WrenchRows) -> WrenchRows:
+    """Transposed pseudo-inverse: thrust of each rotor for a newton of thrust, or a newton metre about each axis.
+
+    Parameters
+    ----------
+    matrix : WrenchRows
+        The effectiveness, of any scalars.
+    """
+    lengths = [sqrt(row.dot(row)) for row in matrix]
+    unit = [row * (1.0 / length) for row, length in zip(matrix, lengths, strict=True)]
+    # L D L^T of the Gram matrix: the rows, each less its part along those before.
+    across: list[PerRotor] = []
+    pivots: list[Scalar] = []
+    share: list[list[Scalar]] = []
+    for row in unit:
+        along = [row.dot(other) / pivot for other, pivot in zip(across, pivots, strict=True)]
+        left = row
+        for part, other in zip(along, across, strict=True):
+            left = left - other * part
+        across.append(left)
+        pivots.append(maximum(left.dot(left), LEAST_PIVOT))
+        share.append(along)
+    # Backwards: column k of the inverse is what the row that is left gives, less what it adds to the rows after it.
+    inverse: list[PerRotor] = [across[k] * (1.0 / pivots[k]) for k in range(len(unit))]
+    for k in reversed(range(len(unit))):
+        for later in range(k + 1, len(unit)):
+            inverse[k] = inverse[k] - inverse[later] * share[later][k]
+    return WrenchRows(*(row * (1.0 / length) for row, length in zip(inverse, lengths, strict=True)))
