@@ -228,3 +228,21 @@ def test_ctrl_c_ends_it_and_loses_nothing(tmp_path: Path) -> None:
     assert flight.outcome.kind == "interrupted"
     shown = float(first[1].split()[1]) if first[1].startswith("t ") else 0.0
     assert flight.outcome.time >= shown
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes of a shell")
+@pytest.mark.parametrize("looks", [["--live", "--live-speed", "1"], []])
+def test_a_pipe_that_closes_does_not_lose_the_flight(looks: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rotorfault", "fly", "paper-set-point", *SHORT, *looks, "--out", "l"]
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+                          env=environment) as process:  # fmt: skip
+        assert process.stdout is not None
+        assert process.stderr is not None
+        if looks:
+            assert process.stdout.readline().startswith("t ")
+        process.stdout.close()
+        assert "Error" not in process.stderr.read()
+    assert process.returncode == 1  # as of every command whose pipe closes
+    assert rf.load(tmp_path / "l" / "flight.nc").outcome.time == 2.5
+    assert (tmp_path / "l" / "summary.json").is_file()

@@ -254,7 +254,8 @@ def campaign(
     InputError
         If an argument cannot be used; nothing has been flown then.
     KeyboardInterrupt
-        On Ctrl-C; what is done is kept in the folder.
+        On Ctrl-C. What is done is kept in the folder, which is its argument; it has none where there is no campaign
+        to resume yet.
     """
     if isinstance(study, Study):
         checked = study
@@ -273,12 +274,15 @@ def campaign(
     run.check(checked)
     executor = executor_of(workers, scheduler)
     complete = not (resume or repair) and run.is_complete(checked, folder)
-    with run.open_store(checked, folder, resume or complete, repair) as store:
-        for damage in store.repaired:
-            say(f"moved aside: {damage.name} ({damage.reason})")
-        for scenario in () if complete else checked.scenarios:
-            doubts.warn(scenario, varied=True)
-        progress = run.fly(checked, store, executor, say)
+    try:
+        with run.open_store(checked, folder, resume or complete, repair) as store:
+            for damage in store.repaired:
+                say(f"moved aside: {damage.name} ({damage.reason})")
+            for scenario in () if complete else checked.scenarios:
+                doubts.warn(scenario, varied=True)
+            progress = run.fly(checked, store, executor, say)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(*[str(folder)] * (folder / STUDY).is_file()) from None
     table = folder / FLIGHTS
     if progress.flights:
         say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")

@@ -107,7 +107,9 @@ def campaign(
             vehicle=vehicle, preset=presets, seed=seed, budget=budget, workers=workers, scheduler=scheduler,
             say=lambda line: say(line, err=True), allow_code=allow_code,
         )  # fmt: skip
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if not stop.args:  # before there was a folder
+            raise
         raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
     _keep(done, keep_flights)
     if report:
@@ -144,7 +146,7 @@ def replay(
 
     Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc --controller sdre
     """
-    from rotorfault.base.files import output_folder
+    from rotorfault.base.files import made_folder
     from rotorfault.campaigns.api import Campaign, replay_changes
     from rotorfault.campaigns.flight_set import flight_of
     from rotorfault.campaigns.replay import identifier_of
@@ -165,11 +167,11 @@ def replay(
     changed = bool(changes) and campaign.is_changed(flight, changes)
     flight_of(study, flight)  # refused before a folder is made for it
     target = out or folder.with_name(f"{folder.name}-replays") / (f"{flight}-changed" if changed else str(flight))
-    output_folder(target)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # told below, in lines of their own
-        flown = campaign.replay(flight, controller=controller, settings=settings)
-    finish(flown, target, figures, view)
+    with made_folder(target):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # told below, in lines of their own
+            flown = campaign.replay(flight, controller=controller, settings=settings)
+        finish(flown, target, figures, view)
     if changed:
         named = ", ".join(f"{key} = {short(value)}" for key, value in changes.items())
         say(f"not the flight of the table, but with {named}")

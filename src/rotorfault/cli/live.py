@@ -6,6 +6,7 @@ one for whatever happens.
 
 from __future__ import annotations
 
+import contextlib
 import time as system_time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -148,6 +149,7 @@ class View:
         self._quiet: dict[int, float] = {}  # until when nothing more is said of the loss of a rotor, s
         self._flown = Flown("", 0.0, 1.0, speed)
         self._last: FlightData | None = None
+        self._closed = False
 
     def __enter__(self) -> View:
         return self
@@ -155,12 +157,21 @@ class View:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
-        if kind is None and self._last is not None:
-            self._show(self._last, len(self._last["time"].values) - 1)
-        self._screen.close()
+        with contextlib.suppress(BrokenPipeError):
+            if kind is None and self._last is not None and not self._closed:
+                self._show(self._last, len(self._last["time"].values) - 1)
+            self._screen.close()
 
     def __call__(self, data: FlightData) -> None:
-        """Show some records, and come back when the last of them has been seen."""
+        """Show some records, and come back when the last of them has been seen; at once where nobody looks."""
+        if self._closed:
+            return
+        try:
+            self._follow(data)
+        except BrokenPipeError:
+            self._closed = True  # as of `| head`: the flight flies on
+
+    def _follow(self, data: FlightData) -> None:
         time, about = np.asarray(data["time"].values), data.attrs
         self._flown = Flown(str(about["title"]), float(about["duration"]), float(about["thrust_max"]), self._speed)
         self._coming.extend(self._happened(data))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
+from rotorfault.base import interrupts
 from rotorfault.base.bounds import require
 from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.base.html import html_note, html_table
@@ -259,8 +260,24 @@ class Flight:
         self.source = str(path)
         return path
 
-    def write(self, folder: str | Path, with_figures: bool = True, with_page: bool = False) -> list[Path]:
+    def write(
+        self,
+        folder: str | Path,
+        with_figures: bool = True,
+        with_page: bool = False,
+        kept: Callable[[], object] = lambda: None,
+    ) -> list[Path]:
         """Write ``flight.nc``, ``summary.json``, the figures and the page ``flight.html`` into a folder.
+
+        The first two come first, and no Ctrl-C comes between; each file is there whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+        with_figures, with_page : bool
+            Whether there are figures, and the page.
+        kept : callable
+            Is called once ``flight.nc`` and ``summary.json`` are there.
 
         Raises
         ------
@@ -271,8 +288,10 @@ class Flight:
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
         # Another flight into the same folder waits: its files must not mix with these.
         with alone_in(folder):
-            written = [self.save(folder / "flight.nc"), folder / "summary.json"]
-            write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            with interrupts.held_back():
+                written = [self.save(folder / "flight.nc"), folder / "summary.json"]
+                write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            kept()
             if with_figures:
                 from rotorfault.report import figures
 
