@@ -38,6 +38,8 @@ def instant(rotors: int = 4, time: float = 2.0) -> Instant:
         loss=0.3 * flags,
         believed=0.28 * flags,
         flagged=flags,
+        stuck=np.full(rotors, np.nan),
+        stuck_believed=np.full(rotors, np.nan),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.results.derived import stuck_text
 
 COLUMNS, ROWS = 25, 7  # of the horizon
 FIELD = 40.0  # degrees of pitch from its lowest to its highest row
@@ -47,6 +48,8 @@ class Instant(NamedTuple):
     loss: Array  # (rotors,), true
     believed: Array  # (rotors,)
     flagged: Array  # (rotors,), 0 or 1
+    stuck: Array  # (rotors,), N: what a rotor gives that is stuck; NaN for others
+    stuck_believed: Array  # (rotors,), the same as believed
 
 
 class Flown(NamedTuple):
@@ -163,27 +166,35 @@ def _numbers(now: Instant, signs: Signs) -> list[str]:
 def _rotors(flown: Flown, now: Instant, width: int, signs: Signs) -> list[str]:
     """A line for each rotor: thrust as a bar, the command as a mark in it, losses."""
     wide = width >= NARROW
-    found = []
-    for k, thrust in enumerate(now.thrust):
-        words = f" true loss {100.0 * now.loss[k]:3.0f} %" if wide else ""
+    said = []
+    for k in range(len(now.thrust)):
+        held = bool(np.isfinite(now.stuck[k]))
+        true = f"true: {stuck_text(now.stuck[k])}" if held else f"true loss {100.0 * now.loss[k]:3.0f} %"
+        words = f" {true}" if wide else ""
         if now.flagged[k] > 0.5:
-            flag = "FALSE ALARM" if now.loss[k] <= 0.0 else "FLAGGED"
-            believed = f"{100.0 * now.believed[k]:3.0f} %"
+            flag = "FLAGGED" if held or now.loss[k] > 0.0 else "FALSE ALARM"
+            believed = _believed(now, k)
             words = f" {flag}, believed {believed},{words}" if wide else f" {flag} {believed}"
+        said.append(words)
+    head, room = "rotor {:<2}", max(41 if wide else 18, *map(len, said)) + 16
+    found = []
+    for k, (thrust, words) in enumerate(zip(now.thrust, said, strict=True)):
         share, command = thrust / flown.thrust_max, now.command[k] / flown.thrust_max
-        head = f"rotor {k + 1:<2}"
-        length = min(width - len(head) - 49, 40) if wide else width - len(head) - 26
-        drawn = bar(share, length, signs, command)
-        found.append(f"{head} {drawn} {100.0 * share:4.0f} %{words}")
+        drawn = bar(share, min(width - room, 40) if wide else width - room, signs, command)
+        found.append(f"{head.format(k + 1)} {drawn} {100.0 * share:4.0f} %{words}")
     return found
+
+
+def _believed(now: Instant, k: int) -> str:
+    """What a flagged rotor is believed to have lost, or to be stuck at."""
+    held = float(now.stuck_believed[k])
+    return stuck_text(held) if np.isfinite(held) else f"{100.0 * now.believed[k]:3.0f} %"
 
 
 def one_liner(now: Instant) -> str:
     """An instant in a line, where there is no terminal."""
     roll, pitch, yaw = np.degrees(now.attitude)
-    flags = [
-        f"rotor {k + 1} {100.0 * now.believed[k]:.0f} %" for k in range(len(now.flagged)) if now.flagged[k] > 0.5
-    ]
+    flags = [f"rotor {k + 1} {_believed(now, k).strip()}" for k in range(len(now.flagged)) if now.flagged[k] > 0.5]
     x, y, z = now.position
     error = float(np.linalg.norm(now.position - now.wanted))
     return (

@@ -22,6 +22,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.cli.app import say
 from rotorfault.cli.cockpit import ASCII, PRETTY, Flown, Instant, lines, one_liner
 from rotorfault.maths.arrays import Array
+from rotorfault.results.derived import believed_stuck_at, stuck_at, stuck_text
 from rotorfault.results.flight_data import FlightData
 
 RATE = 12.0  # views a second
@@ -200,7 +201,8 @@ class View:
     def _happened(self, data: FlightData) -> Iterator[tuple[float, str]]:
         """Faults, alarms and stages of a landing in some records, in words."""
         time = np.asarray(data["time"].values)
-        loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
+        held = stuck_at(data)
+        loss = np.where(np.isfinite(held), 2.0, np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float)))
         flag = np.asarray(data["fault_flag"].values) > 0.5
         stage = np.asarray(data["landing_stage"].values if "landing_stage" in data else np.zeros(len(time)))
         table = np.hstack([loss, flag, stage[:, None]])
@@ -211,10 +213,12 @@ class View:
             when, k = float(time[at]), int(column)
             rotor = k % rotors
             if k < rotors:
-                if when < self._quiet.get(rotor, 0.0):  # that of a stuck rotor is never at rest
+                if when < self._quiet.get(rotor, 0.0):  # a loss may come as a ramp
                     continue
                 self._quiet[rotor] = when + LINE
                 words = f"rotor {rotor + 1}: true loss now {100.0 * loss[at, rotor]:.3g} %"
+                if np.isfinite(held[at, rotor]):
+                    words = f"rotor {rotor + 1} is {stuck_text(held[at, rotor])}"
             elif k < 2 * rotors:
                 wrong = "false alarm: " if flag[at, rotor] and loss[at, rotor] <= 0.0 else ""
                 words = f"{wrong}rotor {rotor + 1} {'flagged' if flag[at, rotor] else 'cleared'}"
@@ -239,4 +243,6 @@ def _instant(data: FlightData, at: int) -> Instant:
         loss=value("loss_true"),
         believed=value("loss_believed"),
         flagged=value("fault_flag"),
+        stuck=stuck_at(data)[at],
+        stuck_believed=believed_stuck_at(data)[at],
     )
