@@ -273,7 +273,9 @@ def test_truncated_files_are_refused(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for size in (0, 100, len(whole) // 2):
         path.write_bytes(whole[:size])
-        assert_refused(run("check", str(path)), "flight.nc")
+        assert_refused(run("check", str(path)), f"flight.nc: is cut or damaged ({size:,} bytes); restore a copy")
+    path.write_bytes(b"no flight at all")
+    assert_refused(run("check", str(path)), "flight.nc: is no flight file; give a flight.nc")
     toml = edited(tmp_path, "vehicle", "name", "name")
     Path(toml).write_text(Path(toml).read_text()[:300])
     assert_refused(run("check", toml), "mine.toml")

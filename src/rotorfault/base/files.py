@@ -158,6 +158,19 @@ def made_folder(path: Path) -> Iterator[Path]:
         raise
 
 
+def instead_of_folder(folder: Path, ending: str) -> str:
+    """What is said of a folder that was given for a file: which file in it may be meant.
+
+    Parameters
+    ----------
+    folder : Path
+    ending : str
+        Of the file that is wanted.
+    """
+    names = sorted(path.name for path in folder.glob(f"*{ending}"))
+    return f"is a folder; {f'give {folder / names[0]}' if names else f'give a {ending} file; there is none in it'}"
+
+
 def read_plain(path: Path) -> bytes:
     """The content of a plain file; a pipe would be waited for, and a device may never end.
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorfault.pages.flight_page import Shown
+    from rotorfault.report.film import Film
 
 
 class Summary(dict[str, Any]):
@@ -180,9 +181,9 @@ class Flight:
         fps : float
             Pictures a second: up to 50 in a GIF, up to 120 in a video.
         width : int
-            Of a picture in pixels, 320 to 3840; its height is 9/16 of it.
+            Of a picture in pixels, even, 320 to 3840; its height is 9/16 of it.
         start, until : float, optional
-            Times of the flight in s; all of it if not given.
+            Times of the flight in s, within it; all of it if not given.
 
         Returns
         -------
@@ -196,11 +197,22 @@ class Flight:
         MissingExtraError
             If a video is wanted and imageio-ffmpeg is not installed.
         """
-        from rotorfault.report.film import Film, write_film
+        from rotorfault.report.film import Film
 
-        name = f"{self.scenario_name} · {self.label}"
-        write_film(self.records(), name, Path(path), Film(speed, fps, width, start, until))
-        return Path(path)
+        return self.film(Path(path), Film(speed, fps, width, start, until))
+
+    def film(self, path: Path, film: Film) -> Path:
+        """Write the flight as a film, as `animate` does.
+
+        Parameters
+        ----------
+        path : Path
+        film : Film
+        """
+        from rotorfault.report.film import write_film
+
+        write_film(self.records(), f"{self.scenario_name} · {self.label}", path, film)
+        return path
 
     def to_csv(self, path: str | Path, every: int = 1, units: bool = True) -> Path:
         """Write all signals as one table, a row per record and a column per component.
