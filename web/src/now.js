@@ -7,10 +7,15 @@ const ROWS = [
   ['position error', 'm', (f, i) => size(f.row('position_error', i))],
   ['speed', 'm/s', (f, i) => size(f.row('velocity', i))],
   ['tilt', '°', (f, i) => tilt(f.row('quaternion', i))],
-  ['yaw', '°', (f, i) => degrees(f.value('attitude', 2, i))],
+  ['yaw', '°', (f, i) => direction(f.value('attitude', 2, i))],
   ['yaw rate', '°/s', (f, i) => degrees(f.value('body_rates', 2, i))],
   ['wind', 'm/s', (f, i) => size(f.row('wind', i))],
 ];
+
+/** An angle within half a turn, in degrees: records count turns, people read a direction. */
+function direction(angle) {
+  return degrees(angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI)));
+}
 
 function size(row) {
   return row ? Math.hypot(...row) : NaN;

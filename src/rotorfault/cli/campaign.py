@@ -148,7 +148,6 @@ def replay(
     """
     from rotorfault.base.files import made_folder
     from rotorfault.campaigns.api import Campaign, replay_changes
-    from rotorfault.campaigns.flight_set import flight_of
     from rotorfault.campaigns.replay import identifier_of
     from rotorfault.scenario.overrides import parse_overrides
 
@@ -163,9 +162,9 @@ def replay(
         if variant is None:
             raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
         flight = identifier_of(study, variant, cell, number)
+    campaign.require_flown(flight)  # refused before a folder is made for it
     changes = replay_changes(controller, settings)
     changed = bool(changes) and campaign.is_changed(flight, changes)
-    flight_of(study, flight)  # refused before a folder is made for it
     target = out or folder.with_name(f"{folder.name}-replays") / (f"{flight}-changed" if changed else str(flight))
     with made_folder(target):
         with warnings.catch_warnings():
@@ -193,7 +192,9 @@ def _keep(campaign: Campaign, cells: int | None) -> None:
         pages = campaign.keep_flights(cells)
     except KeyboardInterrupt:
         raise stopped("interrupted; the pages that were made are kept, so are all flights") from None
-    say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}")
+    places = f"in each of the {cells} cells" if cells > 1 else "in the cell"
+    each = f"one for each variant {places} nearest to 50 % success, where it was flown"
+    say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}: {each}")
 
 
 def _report(campaign: Campaign, page: Path | None = None) -> None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rotorfault.base.angles import wrapped
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 from rotorfault.results.derived import stuck_text
@@ -150,7 +151,7 @@ def horizon(roll: float, pitch: float, signs: Signs) -> list[str]:
 
 
 def _numbers(now: Instant, signs: Signs) -> list[str]:
-    roll, pitch, yaw = np.degrees(now.attitude)
+    roll, pitch, yaw = _degrees(now)
     x, y, z = now.position
     a, b, c = now.position - now.wanted
     degree = signs.degree
@@ -161,6 +162,12 @@ def _numbers(now: Instant, signs: Signs) -> list[str]:
         f"position   x {x:+8.3f}   y {y:+8.3f}   z {z:+8.3f} m",
         f"speed        {now.speed:8.3f} m/s",
     ]
+
+
+def _degrees(now: Instant) -> Array:
+    """Roll, pitch and yaw in degrees, each within half a turn."""
+    angles: Array = np.degrees([wrapped(float(angle)) for angle in now.attitude])
+    return angles
 
 
 def _rotors(flown: Flown, now: Instant, width: int, signs: Signs) -> list[str]:
@@ -193,7 +200,7 @@ def _believed(now: Instant, k: int) -> str:
 
 def one_liner(now: Instant) -> str:
     """An instant in a line, where there is no terminal."""
-    roll, pitch, yaw = np.degrees(now.attitude)
+    roll, pitch, yaw = _degrees(now)
     flags = [f"rotor {k + 1} {_believed(now, k).strip()}" for k in range(len(now.flagged)) if now.flagged[k] > 0.5]
     x, y, z = now.position
     error = float(np.linalg.norm(now.position - now.wanted))

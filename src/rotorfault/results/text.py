@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rotorfault.base.angles import wrapped
 from rotorfault.base.plain_text import one_line
 from rotorfault.loop.scores import YAW_KEPT
 from rotorfault.results.derived import stuck_text
@@ -35,9 +36,10 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     found += _settling_rows(summary)
     shares = _given_up(summary).items()
     given_up = ", ".join(f"{what} {number(100.0 * share, '%', 3)}" for what, share in shares)
+    attitude = {name: None if angle is None else wrapped(angle) for name, angle in summary["attitude_end"].items()}
     found += [
         ("position error at the end", per_axis(summary["position_error_end"], "m")),
-        ("attitude at the end", per_axis(summary["attitude_end"], "rad")),
+        ("attitude at the end", per_axis(attitude, "rad")),
         ("position mean square error", per_axis(summary["position_mse"], "m^2")),
         ("attitude mean square error", per_axis(summary["attitude_mse"], "rad^2")),
         ("cost J", number(summary["cost"], digits=5)),
