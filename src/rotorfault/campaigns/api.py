@@ -178,8 +178,8 @@ class Campaign:
             span = pc.min_max(found).as_py()
             there = f", {span['min']} to {span['max']}" if len(found) else ""
             raise InputError(
-                f"{self.study.name} has flown no flight {short(identifier)}; allowed: the {len(found):,} of column 'id' "
-                f"of its table{there}"
+                f"{self.study.name} has flown no flight {short(identifier)}; allowed: the {len(found):,} of column "
+                f"'id' of its table{there}"
             )
 
     def is_changed(self, identifier: int, changes: Mapping[str, Any]) -> bool:
