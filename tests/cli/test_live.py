@@ -60,6 +60,19 @@ def test_the_view_fits_any_terminal(size: tuple[int, int], rotors: int) -> None:
         assert shown[-1] == "event 8"
 
 
+def test_a_small_terminal_cuts_no_word() -> None:
+    event = "1.80 s  rotor 1 flagged, and more is said of it"
+    shown = lines(FLOWN, instant(), [event], 30, 10, ASCII)
+    text = "\n".join(shown)
+    assert "position error    0.500 m" in text
+    assert "roll +11 pitch -6 yaw +29 deg" in text
+    assert "rotor 1     50 % FLAGGED  28 %" in text
+    assert " ".join(text.split()).endswith("1.80 s rotor 1 flagged, and more is said of it")
+    assert all(len(line) <= 30 for line in shown)
+    long = FLOWN._replace(title="a flight of many words to tell")
+    assert lines(long, instant(), [], 20, 12)[0] == "a flight of many w.."
+
+
 def test_a_terminal_of_few_letters_gets_those() -> None:
     shown = "\n".join(lines(FLOWN, instant(), [], 100, 30, ASCII))
     assert shown.isascii()

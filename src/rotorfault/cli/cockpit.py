@@ -6,6 +6,7 @@ Lines are made for the width and height that there are: what does not fit is lef
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -79,13 +80,17 @@ def lines(
     """
     share = now.time / flown.duration if flown.duration > 0.0 else 1.0
     clock = f"t {now.time:.2f} of {flown.duration:g} s, {flown.speed:g} x real time"
-    head = [one_line(flown.title), f"{bar(share, max(width - len(clock) - 1, 0), signs)} {clock}".strip()]
+    head = [
+        _cut(one_line(flown.title), width),
+        f"{bar(share, max(width - len(clock) - 1, 0), signs)} {clock}".strip(),
+    ]
     rotors = _rotors(flown, now, width, signs)
-    numbers = _numbers(now, signs)
+    numbers = [_fitting(forms, width) for forms in _numbers(now, signs)]
     picture = horizon(float(now.attitude[0]), float(now.attitude[1]), signs)
-    words = [one_line(text) for text in said]
+    words = [line for text in said for line in wrap(one_line(text), max(width, 1), subsequent_indent="  ")]
     # From all there is to what matters most.
-    beside = [f"{p}   {n}" for p, n in zip(picture, [*numbers, *[""] * ROWS], strict=False)]
+    whole = [forms[0] for forms in _numbers(now, signs)]
+    beside = [f"{p}   {n}" for p, n in zip(picture, [*whole, *[""] * ROWS], strict=False)]
     view = beside if width >= NARROW else numbers
     if len(head) + len(view) + len(rotors) + 2 > height - 1:
         view = numbers
@@ -97,7 +102,17 @@ def lines(
         room = height - 1 - len(head) - len(view) - len(rotors)
     last = words[-max(min(room, 5), 0) :] if room > 0 else []
     found = [*head, *view, *rotors, *last]
-    return [line[:width] for line in found[: max(height - 1, 1)]]
+    return [_cut(line, width) for line in found[: max(height - 1, 1)]]
+
+
+def _cut(text: str, width: int) -> str:
+    """A text in so many columns; where words are lost, dots say so."""
+    return text if len(text) <= width else f"{text[: max(width - 2, 0)].rstrip()}.."[:width]
+
+
+def _fitting(forms: Sequence[str], width: int) -> str:
+    """The first form of a line that fits, else the shortest."""
+    return next((form for form in forms if len(form) <= width), forms[-1])
 
 
 def bar(share: float, length: int, signs: Signs, mark: float | None = None) -> str:
@@ -150,17 +165,23 @@ def horizon(roll: float, pitch: float, signs: Signs) -> list[str]:
     return rows
 
 
-def _numbers(now: Instant, signs: Signs) -> list[str]:
+def _numbers(now: Instant, signs: Signs) -> list[tuple[str, ...]]:
+    """Lines of numbers, each in forms for wide and for narrow terminals."""
     roll, pitch, yaw = _degrees(now)
     x, y, z = now.position
     a, b, c = now.position - now.wanted
     degree = signs.degree
+    off = float(np.linalg.norm(now.position - now.wanted))
     return [
-        f"position error {np.linalg.norm(now.position - now.wanted):8.3f} m",
-        f"attitude  roll {roll:+6.1f}{degree}  pitch {pitch:+6.1f}{degree}  yaw {yaw:+6.1f}{degree}",
-        f"errors     x {a:+8.3f}   y {b:+8.3f}   z {c:+8.3f} m",
-        f"position   x {x:+8.3f}   y {y:+8.3f}   z {z:+8.3f} m",
-        f"speed        {now.speed:8.3f} m/s",
+        (f"position error {off:8.3f} m", f"error {off:.3g} m"),
+        (
+            f"attitude  roll {roll:+6.1f}{degree}  pitch {pitch:+6.1f}{degree}  yaw {yaw:+6.1f}{degree}",
+            f"roll {roll:+.0f} pitch {pitch:+.0f} yaw {yaw:+.0f} deg",
+            f"{roll:+.0f} {pitch:+.0f} {yaw:+.0f} deg",
+        ),
+        (f"errors     x {a:+8.3f}   y {b:+8.3f}   z {c:+8.3f} m", f"off by {a:+.3g} {b:+.3g} {c:+.3g} m"),
+        (f"position   x {x:+8.3f}   y {y:+8.3f}   z {z:+8.3f} m", f"at {x:+.3g} {y:+.3g} {z:+.3g} m"),
+        (f"speed        {now.speed:8.3f} m/s", f"speed {now.speed:.3g} m/s"),
     ]
 
 
