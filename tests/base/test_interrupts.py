@@ -23,8 +23,8 @@ from rotorfault.base.resumable import Task
 from rotorfault.campaigns import run as campaigns
 from rotorfault.cli import catalogue
 from rotorfault.flight import fly as flying
-from rotorfault.report import figures
-from rotorfault.results import netcdf
+from rotorfault.report import figures, film
+from rotorfault.results import exporters, netcdf
 from rotorfault.results.flight_data import FlightData
 from rotorfault.tuning import search
 
@@ -207,3 +207,25 @@ def test_an_interrupt_before_anything_is_there_leaves_no_folder_and_advises_no_r
         assert done.returncode == 130
         assert done.stderr == "rotorfault: interrupted\n"
         assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "place", "name"),
+    [
+        (("export", "flight.nc", "--to", "csv"), exporters.FORMATS, "csv"),
+        (("animate", "flight.nc"), film.WRITERS, ".gif"),
+    ],
+)
+def test_an_interrupt_while_a_flight_is_exported_leaves_nothing(
+    command: tuple[str, ...], place: dict[str, object], name: str, tmp_path: Path
+) -> None:
+    def begin(*given: object) -> None:
+        next(one for one in given if isinstance(one, Path)).write_text("half of it")
+        _interrupt()
+
+    rf.fly("hover-fault", settings={"duration": 0.1, "fault": []}).save(tmp_path / "flight.nc")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(place, name, begin)
+        done = run(*command, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (130, "rotorfault: interrupted\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.nc"]

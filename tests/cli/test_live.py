@@ -70,7 +70,7 @@ def test_a_small_terminal_cuts_no_word() -> None:
     assert " ".join(text.split()).endswith("1.80 s rotor 1 flagged, and more is said of it")
     assert all(len(line) <= 30 for line in shown)
     long = FLOWN._replace(title="a flight of many words to tell")
-    assert lines(long, instant(), [], 20, 12)[0] == "a flight of many w.."
+    assert lines(long, instant(), [], 20, 20)[0] == "a flight of many w.."
 
 
 def test_a_terminal_of_few_letters_gets_those() -> None:

@@ -69,9 +69,10 @@ class Film(NamedTuple):
 
     def _require(self, name: str, kind: type, low: float, high: float, unit: str) -> None:
         value = getattr(self, name)
-        right = isinstance(value, kind) and not isinstance(value, bool) and low <= value <= high
+        number = isinstance(value, kind) and not isinstance(value, bool)
+        right = number and low <= float(getattr(self, name)) <= high
         # An odd number of pixels is no size of a video.
-        if not right or (kind is Integral and value % 2):
+        if not right or (kind is Integral and int(getattr(self, name)) % 2):
             words = "an even whole number" if kind is Integral else "a number"
             raise InputError(
                 f"{self.called(name)}: got {short(value)}; allowed: {words} from {low:g} to {high:g} {unit}"

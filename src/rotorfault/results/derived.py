@@ -68,7 +68,7 @@ def stuck_at(data: Recorded) -> Array:
     data : Recorded
         What it does not say of its faults counts as none.
     """
-    held = np.full(_of(data, "thrust").shape if "thrust" in data else (0, 0), np.nan)
+    held = np.full_like(_of(data, "thrust") if "thrust" in data else np.empty((0, 0)), np.nan)
     for rotor in range(1, held.shape[1] + 1):
         for fault in faults_of(data, rotor):
             try:
