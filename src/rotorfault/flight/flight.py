@@ -13,7 +13,7 @@ from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.results import exporters
-from rotorfault.results.derived import believed_stuck_at, stuck_at
+from rotorfault.results.derived import stuck_rotors
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
@@ -116,11 +116,7 @@ class Flight:
         names = ("scenario", "controller", "preset", "plant", "engine")
         about = {name: str(attributes.get(name, "")) for name in names}
         numbers = nested(self.scores)
-        if numbers["detections"]:
-            data = self.records()
-            for name, held in (("stuck_thrust", stuck_at(data)), ("stuck_thrust_believed", believed_stuck_at(data))):
-                for hit in numbers["detections"]:
-                    hit[name] = float(held[-1, hit["rotor"] - 1])
+        numbers["stuck"] = stuck_rotors(self.records()) if numbers["detections"] else []
         numbers = finite_or_none(numbers)
         return Summary(**about, seed=int(attributes["seed"]), version=str(attributes["version"]), **numbers)
 

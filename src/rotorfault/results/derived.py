@@ -92,6 +92,20 @@ def believed_stuck_at(data: Recorded) -> Array:
     return believed
 
 
+def stuck_rotors(data: Recorded) -> list[dict[str, float]]:
+    """Number of each rotor that is stuck at the end, the thrust that it gives and the one believed (NaN: none), in N.
+
+    Parameters
+    ----------
+    data : Recorded
+    """
+    held, believed = stuck_at(data)[-1:], believed_stuck_at(data)[-1:]
+    return [
+        {"rotor": int(k) + 1, "thrust": float(held[0, k]), "thrust_believed": float(believed[0, k])}
+        for k in np.flatnonzero(np.isfinite(held).any(axis=0))
+    ]
+
+
 def stuck_text(thrust: float) -> str:
     """What people are told of a stuck rotor."""
     return f"stuck at {thrust:.3g} N"

@@ -71,11 +71,12 @@ def _fault_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         back = summary["recovery_time"]
         found.append(("back within 0.25 m", _back(back, _why(summary))))
     found.append(("altitude lost", number(summary["altitude_lost"], "m", 3)))
+    stuck = {one["rotor"]: one for one in summary.get("stuck", [])}
     for hit in summary["detections"]:
         seen = hit["detected_time"] is not None
         text = f"flagged after {1e3 * hit['delay']:.0f} ms, " if seen else "not detected"
-        if (held := hit.get("stuck_thrust")) is not None:
-            believed = hit.get("stuck_thrust_believed")
+        if (one := stuck.get(hit["rotor"])) is not None:
+            held, believed = one["thrust"], one["thrust_believed"]
             belief = f"loss {number(hit['loss_estimated'], digits=3)}" if believed is None else stuck_text(believed)
             text += f"believed {belief} (true: {stuck_text(held)})" if seen else f"; {stuck_text(held)}"
         elif seen:
