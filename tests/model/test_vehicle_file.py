@@ -175,7 +175,7 @@ def test_missing_files_and_names_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         load_vehicle(tmp_path / "none.toml")
     (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(InputError, match="is a directory"):
+    with pytest.raises(InputError, match="is a folder; give a file in it"):
         load_vehicle(tmp_path / "folder.toml")
     with pytest.raises(InputError, match="unknown vehicle 'papr'; did you mean 'paper'"):
         load_vehicle("papr")

@@ -52,6 +52,7 @@ KINDS = {
 }
 """Kinds of values that depend on frames."""
 
+UNIT = 1e-3  # by which the norm of a quaternion may miss 1: what three digits leave of it
 MOTORS = "motors"
 CORNERS = ("front right", "rear left", "front left", "rear right")
 """Where the motors of an X quadrotor are, in PX4's order."""
@@ -152,19 +153,46 @@ def convert(kind: str, values: ArrayLike, source: str | Path | Vehicle, target: 
     >>> rf.convert("motors", [10, 20, 30, 40], "px4", "crazyflie-2.1")
     array([10., 20., 40., 30.])
     """
+    names = components(kind)
     if kind == MOTORS:
         before, after = layout(source), layout(target)
-        numbers = _numbers(kind, values, ("1", "2", "3", "4"))
-        return numbers[..., [before.corners.index(corner) for corner in after.corners]]
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(unknown("kind of value", kind, [*KINDS, MOTORS]))
+        return _numbers(kind, values, names)[..., [before.corners.index(corner) for corner in after.corners]]
     for frame in (source, target):
         if not isinstance(frame, str) or frame not in FRAMES:
             hint = "; its frames are 'ned'" if frame in ("px4", "ardupilot") else ""
             raise InputError(unknown("frame", frame, list(FRAMES)) + hint)
-    numbers = _numbers(kind, values, KINDS[kind].names)
+    numbers = _numbers(kind, values, names)
+    if kind == "quaternion":
+        _require_turns(numbers)
     # Adding 0 makes 0 of -0, which nobody wants to read.
     return numbers.copy() if source == target else numbers * np.array(KINDS[kind].signs) + 0.0
+
+
+def components(kind: str) -> tuple[str, ...]:
+    """Names of the components of a kind of value; of motors, their numbers.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind.
+    """
+    if kind == MOTORS:
+        return ("1", "2", "3", "4")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(unknown("kind of value", kind, [*KINDS, MOTORS]))
+    return KINDS[kind].names
+
+
+def _require_turns(quaternions: Array) -> None:
+    """Refuse quaternions that are no attitude: those that are not of norm 1, as far as they are written."""
+    norms = np.linalg.norm(quaternions, axis=-1).ravel()
+    wrong = norms[~(np.abs(norms - 1.0) <= UNIT)]
+    if len(wrong):
+        raise InputError(
+            f"quaternion: its norm is {wrong[0]:.6g}; allowed: 1, up to {UNIT:g}; divide its components by the norm"
+            if wrong[0] > 0.0
+            else "quaternion: its norm is 0, so it is no attitude; allowed: a norm of 1, such as (1, 0, 0, 0)"
+        )
 
 
 def _numbers(kind: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
@@ -177,4 +205,8 @@ def _numbers(kind: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
         raise InputError(
             f"{kind}: got {short(values)}; allowed: {len(names)} numbers ({', '.join(names)}), or rows of them"
         )
-    return found.astype(float)
+    numbers = found.astype(float)
+    if not np.isfinite(numbers).all():
+        wrong = numbers[~np.isfinite(numbers)][0]
+        raise InputError(f"{kind}: got {wrong:g} among its values; allowed: finite numbers")
+    return numbers
