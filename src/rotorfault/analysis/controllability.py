@@ -134,7 +134,8 @@ def critical_scale(problem: HoverProblem) -> float:
         return math.inf  # the ray lies outside, or in the boundary
     ends = np.stack([middle[~flat] - reach[~flat], middle[~flat] + reach[~flat]]) / along[~flat]
     first, last = max(0.0, float(ends.min(axis=0).max())), float(ends.max(axis=0).min())
-    return 1.0 / last if last - first > FLAT * last else math.inf
+    # Of the boundary, where the ray may run, it is no more than rounding that is inside.
+    return 1.0 / last if last - first > FLAT * max(last, size / float(np.linalg.norm(needed))) else math.inf
 
 
 def acai(

@@ -56,7 +56,7 @@ class Motor(NamedTuple):
     @property
     def azimuth(self) -> float:
         """Angle of the motor in degrees, clockwise from the nose as seen from above, above -180 up to 180."""
-        angle = math.degrees(math.atan2(-self.y, self.x))
+        angle = math.degrees(math.atan2(-self.y, self.x)) + 0.0  # of -0, which nobody wants to read, it makes 0
         return 180.0 if angle < -180.0 + 1e-6 else angle
 
     @property
