@@ -328,7 +328,7 @@ def _problem(
 
 def _failed(failed: Iterable[int], count: int) -> set[int]:
     """Checked numbers of motors."""
-    require(failed, Iterable, "failed", "numbers of motors, such as [1, 4]")  # type: ignore[type-abstract]
+    require(failed, Iterable, "failed", "numbers of motors, such as [1, 4]")
     return {whole_number(number, "failed motor", 1, count) for number in failed}
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from rotorfault.analysis.controllability import HoverProblem, control_authority, critical_scale, hover_problem
 from rotorfault.base.bounds import positive
 from rotorfault.base.files import in_folder, write_atomically
-from rotorfault.base.text_table import table_lines
+from rotorfault.base.text_table import table_lines, terminal_width
 from rotorfault.model.frames import Frame, ReferenceVehicle
 
 MOST_LOST = 2  # motors in the sets that are gone through
@@ -119,13 +119,13 @@ def summary_lines(frames: Sequence[Frame], cases: Sequence[FrameCase], lost: int
     lost : int
         How many motors have failed.
     """
-    rows = [("frame", "motors", "ACAI [N], yaw held", "given up", "critical T/W, yaw held", "given up")]
+    rows = [["frame", "motors", "ACAI [N], yaw held", "given up", "critical T/W, yaw held", "given up"]]
     for frame in frames:
         own = [case for case in cases if case.frame == frame.name and len(case.failed) == lost]
         cells = [_range([c.acai for c in own if c.channels == channels], ".4f") for channels in (HELD, GIVEN_UP)]
         for channels in (HELD, GIVEN_UP):
             cells.append(_ratios([c.critical_thrust_to_weight for c in own if c.channels == channels]))
-        rows.append((frame.name, str(len(frame.motors)), *cells))
+        rows.append([frame.name, str(len(frame.motors)), *cells])
     return table_lines(rows, "<>>>>>", rule=True)
 
 
@@ -154,10 +154,10 @@ def case_lines(cases: Sequence[FrameCase], names: bool = False) -> list[str]:
             found.append((case.frame, numbers, [failed]))
     heading = ["frame"] if names else []
     rows = [[*heading, "ACAI [N], yaw held", "given up", "critical T/W, yaw held", "given up", "failed motors"]]
-    for frame, numbers, sets in found:
-        cells = [*(_fixed(x, ".4f") for x in numbers[:2]), *(_ratio(x) for x in numbers[2:])]
+    for frame, known, sets in found:
+        cells = [*(_fixed(x, ".4f") for x in known[:2]), *(_ratio(x) for x in known[2:])]
         rows.append([*([frame] if names else []), *cells, ", ".join(sets)])
-    return table_lines(rows, ("<" if names else "") + ">>>><", rule=True, most=118)
+    return table_lines(rows, ("<" if names else "") + ">>>><", rule=True, most=terminal_width())
 
 
 def same_motors(frames: Iterable[Frame]) -> list[list[Frame]]:
