@@ -149,7 +149,7 @@ def frames() -> Figure:
         motors([p for _, p in sorted(places)], [motor.clockwise for motor in frame.motors], frame.name, axes, size)
         axes.title.set_fontsize(7.5)
     _key(made)
-    made.text(0.98, 0.02, "arrow: forward", ha="right", fontsize=8.0)
+    made.text(0.98, 0.02, "▲ forward", ha="right", fontsize=8.0)
     return made
 
 
