@@ -11,7 +11,8 @@ turn about x, whose matrix is D = diag(1, -1, -1) = D^-1. So
 and the way back is the same. Quaternions are Hamilton's, scalar first, body to world, in all of them.
 
 The motors of an X quadrotor are named by where they are. The orders are those of PX4's generic quad X (airframe
-4001), of ArduPilot's FRAME_CLASS 1 with FRAME_TYPE 1, of Betaflight's quad X with props in, and of the Crazyflie.
+4001), of ArduPilot's FRAME_CLASS 1 with FRAME_TYPE 1, of Betaflight's quad X with props in, and of the Crazyflie;
+`frames` has them.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from rotorfault.base.errors import InputError, choices, short, unknown
 from rotorfault.maths.arrays import Array
+from rotorfault.model.frames import load_frame, place_of
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
 
@@ -54,16 +56,11 @@ KINDS = {
 
 UNIT = 1e-3  # by which the norm of a quaternion may miss 1: what three digits leave of it
 MOTORS = "motors"
-CORNERS = ("front right", "rear left", "front left", "rear right")
-"""Where the motors of an X quadrotor are, in PX4's order."""
-ORDERS = {
-    "px4": CORNERS,
-    "ardupilot": CORNERS,
-    "betaflight": ("rear right", "front right", "rear left", "front left"),
-    "crazyflie": ("front right", "rear right", "rear left", "front left"),
-}
+_NAMED = {"px4": "px4-4001", "ardupilot": "ardupilot-1-1", "betaflight": "betaflight", "crazyflie": "crazyflie"}
+ORDERS = {who: tuple(motor.place for motor in load_frame(name).motors) for who, name in _NAMED.items()}
 """Where motors 1, 2, 3, 4 are. Propellers at the front right and rear left turn counter-clockwise in all of them."""
-_COUNTER_CLOCKWISE = ("front right", "rear left")
+CORNERS = ORDERS["px4"]
+"""Where the motors of an X quadrotor are, in PX4's order."""
 
 
 class Layout(NamedTuple):
@@ -88,7 +85,7 @@ def layout(of: str | Path | Vehicle) -> Layout:
         If there is no such order or vehicle, or the vehicle has no rotor at each corner.
     """
     if isinstance(of, str) and of in ORDERS:
-        return Layout(ORDERS[of], tuple(corner not in _COUNTER_CLOCKWISE for corner in ORDERS[of]))
+        return Layout(ORDERS[of], tuple(motor.clockwise for motor in load_frame(_NAMED[of]).motors))
     if isinstance(of, (str, Path)):
         try:
             vehicle = load_vehicle(of).vehicle
@@ -103,20 +100,13 @@ def layout(of: str | Path | Vehicle) -> Layout:
         vehicle = of
     else:
         raise InputError(f"order of motors: got {short(of)}; {choices([*ORDERS, 'a vehicle'])}")
-    corners = tuple(_corner(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+    corners = tuple(place_of(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
     if set(corners) != set(CORNERS):
         raise InputError(
             f"{of if isinstance(of, (str, Path)) else 'vehicle'}: its rotors are {', '.join(corners)}; orders of "
             "motors are known for X quadrotors, which have one each front right, rear left, front left and rear right"
         )
     return Layout(corners, tuple(sign > 0.0 for sign in vehicle.rotor_yaw_sign))
-
-
-def _corner(x: float, y: float) -> str:
-    """Where a rotor at x forward, y left of the centre of mass is, in m; on an axis it is at no corner."""
-    along = "front" if x > 1e-6 else "rear" if x < -1e-6 else ""
-    across = "left" if y > 1e-6 else "right" if y < -1e-6 else ""
-    return " ".join(filter(None, (along, across))) or "centre"
 
 
 def convert(kind: str, values: ArrayLike, source: str | Path | Vehicle, target: str | Path | Vehicle) -> Array:
