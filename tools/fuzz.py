@@ -24,7 +24,8 @@ from fuzz_kinds import KINDS, Kind, outcome
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
 BLOCK = 50  # inputs that one seed gives
-SLOW = 20  # s, beyond which an input counts as work without bound
+SLOW = 20  # s of the processor, beyond which an input counts as work without bound
+STILL = 300  # s by the clock, beyond which it waits for something that does not come
 COLUMNS = ("accepted", "refused", "flown", "lost", "failed")
 
 
@@ -45,7 +46,8 @@ def fuzz(kind: Kind, number: int, counts: collections.Counter[str], failures: di
     def run(value: Any) -> None:
         place = f"{kind.name}, seed {number}, input {next(example)}"
         try:
-            signal.alarm(SLOW)
+            signal.setitimer(signal.ITIMER_PROF, SLOW)
+            signal.alarm(STILL)
             counts[outcome(kind, value)] += 1
         except Exception as error:
             counts["failed"] += 1
@@ -57,6 +59,7 @@ def fuzz(kind: Kind, number: int, counts: collections.Counter[str], failures: di
                 told = "".join(traceback.format_exception(error)[-4:])
                 failures[key] = f"{place}\n  {repr_of(value)}\n  {told}"
         finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
             signal.alarm(0)
 
     run()
@@ -83,9 +86,10 @@ def main() -> int:
     blocks = chosen.blocks or max(1, -(-chosen.count // (BLOCK * len(kinds))))
 
     def stop(*_: object) -> None:
-        raise SlowError(f"took more than {SLOW} s")
+        raise SlowError(f"took more than {SLOW} s of the processor, or {STILL} s by the clock")
 
-    signal.signal(signal.SIGALRM, stop)
+    for number in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(number, stop)
     faulthandler.enable()
     warnings.simplefilter("ignore")
     failures: dict[str, str] = {}

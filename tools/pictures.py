@@ -26,7 +26,9 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 from PIL import Image
 
 import rotorfault as rf
+from rotorfault.analysis.frame_survey import same_motors
 from rotorfault.model.conventions import CORNERS, ORDERS, layout
+from rotorfault.model.frames import frame_names, load_frame
 from rotorfault.report.style import BLACK, BLUE, CM, STYLE, VERMILION
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
@@ -49,7 +51,9 @@ def figure(height: float) -> Figure:
 # ------------------------------------------------------------------------------------------------------------- motors
 
 
-def motors(places: Sequence[tuple[float, float]], clockwise: Sequence[bool], title: str, axes: Axes) -> None:
+def motors(
+    places: Sequence[tuple[float, float]], clockwise: Sequence[bool], title: str, axes: Axes, size: float = 1.0
+) -> None:
     """Motors seen from above, forward up, each with its number and the way that its propeller turns.
 
     Parameters
@@ -59,28 +63,38 @@ def motors(places: Sequence[tuple[float, float]], clockwise: Sequence[bool], tit
     clockwise : sequence of bool
     title : str
     axes : Axes
+    size : float
+        Of a motor, over that of motors of which there are four.
     """
     points = np.array(places) / max(math.hypot(*place) for place in places)
     for x, y in points:
-        axes.plot([0.0, y], [0.0, x], color="0.8", linewidth=4.0, zorder=1, solid_capstyle="round")
+        axes.plot([0.0, y], [0.0, x], color="0.8", linewidth=4.0 * size, zorder=1, solid_capstyle="round")
     for number, ((x, y), right) in enumerate(zip(points, clockwise, strict=True), start=1):
         colour = BLUE if right else VERMILION
-        axes.add_patch(Circle((y, x), 0.36, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2))
-        axes.text(y, x, str(number), ha="center", va="center", fontsize=12.0, color=BLACK, zorder=4)
+        axes.add_patch(Circle((y, x), 0.36 * size, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2))
+        axes.text(y, x, str(number), ha="center", va="center", fontsize=5.0 + 7.0 * size**2, color=BLACK, zorder=4)
         for start in (0.25 * math.pi, 1.25 * math.pi):  # from forward, towards the left
             sweep = start + np.linspace(0.0, 0.6 * math.pi, 25) * (-1.0 if right else 1.0)
-            arc = np.column_stack([y + 0.26 * np.sin(sweep), x + 0.26 * np.cos(sweep)])
+            arc = np.column_stack([y + 0.26 * size * np.sin(sweep), x + 0.26 * size * np.cos(sweep)])
             axes.plot(*arc.T, color=colour, linewidth=1.3, zorder=3)
             axes.add_patch(
                 FancyArrowPatch(
-                    tuple(arc[-4]), tuple(arc[-1]), arrowstyle="-|>", mutation_scale=9.0, color=colour, linewidth=0.0,
-                    shrinkA=0.0, shrinkB=0.0, zorder=3,
+                    tuple(arc[-4]), tuple(arc[-1]), arrowstyle="-|>", mutation_scale=9.0 * size, color=colour,
+                    linewidth=0.0, shrinkA=0.0, shrinkB=0.0, zorder=3,
                 )
             )  # fmt: skip
     axes.add_patch(
-        FancyArrowPatch((0.0, 0.0), (0.0, 0.5), arrowstyle="-|>", mutation_scale=12.0, color=BLACK, linewidth=1.4)
+        FancyArrowPatch(
+            (0.0, 0.0),
+            (0.0, 0.5 * size),
+            arrowstyle="-|>",
+            mutation_scale=12.0 * size,
+            color=BLACK,
+            linewidth=1.4 * size,
+        )
     )
-    axes.text(0.0, 0.58, "forward", ha="center", va="bottom", fontsize=7.0) if abs(points[:, 1]).min() > 0.1 else None
+    if size == 1.0 and abs(points[:, 1]).min() > 0.1:
+        axes.text(0.0, 0.58, "forward", ha="center", va="bottom", fontsize=7.0)
     axes.set(xlim=(1.42, -1.42), ylim=(-1.42, 1.42), aspect="equal", title=title)
     axes.axis("off")
 
@@ -110,6 +124,32 @@ def motors_autopilots() -> Figure:
     for place, (name, title) in enumerate(titles.items()):
         motors([where[c] for c in ORDERS[name]], layout(name).clockwise, title, made.add_subplot(1, 3, place + 1))
     _key(made)
+    return made
+
+
+def frames() -> Figure:
+    """Named frames, one of those whose motors are the same; of two motors on an arm one is drawn farther out."""
+    groups = same_motors(load_frame(name) for name in frame_names())
+    columns = 6
+    rows = math.ceil(len(groups) / columns)
+    made = figure(3.3 * rows + 0.9)
+    made.get_layout_engine().set(rect=(0.0, 0.05, 1.0, 0.95))  # type: ignore[union-attr]
+    for at, (frame, *_) in enumerate(groups):
+        seen: set[tuple[float, float]] = set()
+        places = []
+        for motor in sorted(frame.motors, key=lambda motor: motor.level == "lower"):
+            place = round(motor.x, 6), round(motor.y, 6)
+            out = 1.8 if place in seen else 1.0
+            seen.add(place)
+            places.append((motor.number, (out * motor.x, out * motor.y)))
+        # Smaller where they are close to each other.
+        size = 0.55 if len(frame.motors) > 10 else 0.9 if len(frame.motors) < 6 else 0.62
+        size = 0.8 if len(seen) == 6 == len(frame.motors) else size
+        axes = made.add_subplot(rows, columns, at + 1)
+        motors([p for _, p in sorted(places)], [motor.clockwise for motor in frame.motors], frame.name, axes, size)
+        axes.title.set_fontsize(7.5)
+    _key(made)
+    made.text(0.98, 0.02, "▲ forward", ha="right", fontsize=8.0)
     return made
 
 
@@ -242,6 +282,7 @@ def flight_page() -> bytes:
 PICTURES: dict[str, Callable[[], Figure | bytes]] = {
     "motors-built-in.png": motors_built_in,
     "motors-autopilots.png": motors_autopilots,
+    "frames.png": frames,
     "data-flow.png": data_flow,
     "gallery-rotors.png": plotted("rotors", CASE),
     "gallery-detection.png": plotted("fault_detection", "hover-fault"),

@@ -1,4 +1,5 @@
-"""The tables of docs/ that repeat what the code knows: settings, presets, keys of files, signals, attainable hover.
+"""The tables of docs/ that repeat what the code knows: settings, presets, keys of files, signals, attainable hover,
+frames.
 
     python tools/settings_tables.py                     print every table with its name
     python tools/settings_tables.py controllers/smc     print one
@@ -11,6 +12,7 @@ between them is replaced; tests/project/test_docs.py compares it with the code.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from rotorfault.autopilot.control.cascade import CascadeSettings
 from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
+from rotorfault.model.frames import FRAMES
 from rotorfault.model.slot import Slot, telemetry_of
 from rotorfault.model.telemetry import RPY, Signal, signals_of
 from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
@@ -51,6 +54,7 @@ def tables() -> dict[str, str]:
     found["signals"] = _loop_signals_table()
     found["signals/parts"] = _part_signals_table()
     found["attainable"] = _attainable_table()
+    found["frames"] = _frames_table()
     found["tuning/weights"] = _weights_table()
     objectives = [[f"`{name}`", kind.says] for name, kind in OBJECTIVES.items()]
     found["tuning/objectives"] = _markdown(["objective", "what it is"], objectives)
@@ -164,6 +168,17 @@ def _attainable_table() -> str:
             [f"`{name}`", thrust, *(f"{x:.4f}" for x in losses), torque, left if after.without_yaw else "none"]
         )
     return _markdown(header, rows)
+
+
+def _frames_table() -> str:
+    """Where the motors of each named frame are, and who numbers them so."""
+    rows = []
+    for frame in FRAMES.values():
+        motors = [f"{motor.azimuth:.4g}{'W' if motor.clockwise else 'C'}" for motor in frame.motors]
+        if any(abs(math.hypot(motor.x, motor.y) - 1.0) > 1e-6 for motor in frame.motors):
+            motors = [f"({m.x:.3g}, {m.y:.3g}){'W' if m.clockwise else 'C'}" for m in frame.motors]
+        rows.append([f"`{frame.name}`", " ".join(motors).replace("-", "−"), "; ".join(frame.conventions)])
+    return _markdown(["frame", "motors 1, 2, ...", "numbered so by"], rows)
 
 
 def _markdown(header: list[str], rows: list[list[str]]) -> str:

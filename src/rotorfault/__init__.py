@@ -18,6 +18,12 @@ from typing import TYPE_CHECKING, Any
 from rotorfault._version import __version__
 
 if TYPE_CHECKING:
+    from rotorfault.analysis.controllability import (
+        ControlAuthority,
+        acai,
+        critical_loss_with,
+        critical_thrust_to_weight,
+    )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
@@ -39,6 +45,7 @@ if TYPE_CHECKING:
     from rotorfault.maths.rotation import Quat
     from rotorfault.model.block import Context, Nothing
     from rotorfault.model.conventions import convert
+    from rotorfault.model.frames import Frame, frame_names, load_frame
     from rotorfault.model.signals import Allocation, Diagnosis, Estimate, Reading, Readings, Reference, State, Wrench
     from rotorfault.model.slot import register
     from rotorfault.model.telemetry import Quantity
@@ -66,6 +73,7 @@ _HOME = {
     "Campaign": "campaigns.api",
     "Comparison": "flight.comparison",
     "Context": "model.block",
+    "ControlAuthority": "analysis.controllability",
     "ControlInputs": "autopilot.control.protocol",
     "ControlOutput": "autopilot.control.protocol",
     "ControllerWarning": "base.errors",
@@ -82,6 +90,7 @@ _HOME = {
     "FaultWarning": "base.errors",
     "Flight": "flight.flight",
     "Flights": "flight.many",
+    "Frame": "model.frames",
     "Ground": "plant.ground",
     "InputError": "base.errors",
     "Mat3": "maths.geometry",
@@ -110,17 +119,22 @@ _HOME = {
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "Wrench": "model.signals",
+    "acai": "analysis.controllability",
     "campaign": "campaigns.api",
     "check_block": "flight.check_block",
     "compare": "flight.comparison",
     "convert": "model.conventions",
     "critical_loss": "analysis.hover",
+    "critical_loss_with": "analysis.controllability",
     "critical_pair": "analysis.hover",
+    "critical_thrust_to_weight": "analysis.controllability",
     "fly": "flight.fly",
     "fly_all": "flight.fly",
     "fly_many": "flight.many",
+    "frame_names": "model.frames",
     "hover_margin": "analysis.hover",
     "load": "flight.flight",
+    "load_frame": "model.frames",
     "load_scenario": "scenario.library",
     "load_vehicle": "model.vehicle_file",
     "neighbour": "scenario.neighbours",
@@ -145,6 +159,7 @@ __all__ = [
     "Campaign",
     "Comparison",
     "Context",
+    "ControlAuthority",
     "ControlInputs",
     "ControlOutput",
     "Controller",
@@ -161,6 +176,7 @@ __all__ = [
     "FaultWarning",
     "Flight",
     "Flights",
+    "Frame",
     "Ground",
     "InputError",
     "Mat3",
@@ -190,17 +206,22 @@ __all__ = [
     "Wind",
     "Wrench",
     "__version__",
+    "acai",
     "campaign",
     "check_block",
     "compare",
     "convert",
     "critical_loss",
+    "critical_loss_with",
     "critical_pair",
+    "critical_thrust_to_weight",
     "fly",
     "fly_all",
     "fly_many",
+    "frame_names",
     "hover_margin",
     "load",
+    "load_frame",
     "load_scenario",
     "load_vehicle",
     "neighbour",

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import rotorfault as rf
+from rotorfault.base.angles import wrapped
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.study import study_from
 from rotorfault.scenario.scenario import scenario_from
@@ -87,3 +88,18 @@ def study(**axis: Any) -> Any:
 def test_axes_of_a_study_are_checked_alike(axis: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         study(**axis)
+
+
+@pytest.mark.parametrize(
+    ("angle", "read"), [(0.5, 0.5), (-18.52, -18.52 + 6.0 * math.pi), (7.0, 7.0 - 2.0 * math.pi), (3.0, 3.0)]
+)
+def test_people_read_angles_within_half_a_turn(angle: float, read: float) -> None:
+    assert wrapped(angle) == pytest.approx(read)
+    summary = rf.fly("hover-fault", settings={"duration": 0.01, "fault": []}).summary()
+    summary["attitude_end"]["yaw"] = angle
+    assert f"yaw {read:.3g} rad" in str(summary)
+
+
+def test_what_is_no_number_stays_none() -> None:
+    assert math.isnan(wrapped(math.nan))
+    assert wrapped(math.inf) == math.inf

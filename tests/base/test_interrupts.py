@@ -9,16 +9,23 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 from command_line import run
 from places import SOURCE
 
+import rotorfault as rf
 from rotorfault.base import interrupts
 from rotorfault.base.executors import Processes
 from rotorfault.base.progress import Bar
 from rotorfault.base.resumable import Task
+from rotorfault.campaigns import run as campaigns
 from rotorfault.cli import catalogue
+from rotorfault.flight import fly as flying
+from rotorfault.report import figures, film
+from rotorfault.results import exporters, netcdf
+from rotorfault.results.flight_data import FlightData
 from rotorfault.tuning import search
 
 
@@ -160,3 +167,65 @@ def test_processes_hold_interrupts_back_from_their_birth_on() -> None:
     found = dict(Processes(2).map(_holds_back, [Task(key, key) for key in range(2)]))
     assert found == {0: True, 1: True}
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def _interrupt(*_: object, **__: object) -> dict[str, object]:
+    signal.raise_signal(signal.SIGINT)
+    return {}
+
+
+def test_an_interrupt_while_a_flight_is_written_loses_nothing_of_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """In the middle of its file, and while figures are drawn of it."""
+    write = netcdf.encoded
+
+    def interrupted(data: FlightData) -> object:
+        _interrupt()
+        return write(data)
+
+    short = ("fly", "hover-fault", "--set", "duration=0.1", "--set", "fault=[]", "--out")
+    for name, place, instead in (("a", netcdf, interrupted), ("b", figures, _interrupt)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(place, "encoded" if place is netcdf else "draw", instead)
+            done = run(*short, str(tmp_path / name))
+        assert done.returncode == 130
+        assert done.stderr.splitlines()[-1].endswith(
+            f"{name} holds the flight, but not all that was to be made of it"
+        )
+        assert {path.name for path in (tmp_path / name).iterdir()} == {"flight.nc", "summary.json"}
+        assert rf.load(tmp_path / name / "flight.nc").outcome.kind == "settled"
+
+
+def test_an_interrupt_before_anything_is_there_leaves_no_folder_and_advises_no_resume(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(campaigns, "check", _interrupt)
+    monkeypatch.setattr(flying, "fly_checked", _interrupt)
+    for command in (("campaign", "partial-loss-map"), ("fly", "hover-fault")):
+        done = run(*command, "--out", str(tmp_path / "results" / "deep"))
+        assert done.returncode == 130
+        assert done.stderr == "rotorfault: interrupted\n"
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("command", "place", "name"),
+    [
+        (("export", "flight.nc", "--to", "csv"), exporters.FORMATS, "csv"),
+        (("animate", "flight.nc"), film.WRITERS, ".gif"),
+    ],
+)
+def test_an_interrupt_while_a_flight_is_exported_leaves_nothing(
+    command: tuple[str, ...], place: dict[str, object], name: str, tmp_path: Path
+) -> None:
+    def begin(*given: object) -> None:
+        next(one for one in given if isinstance(one, Path)).write_text("half of it")
+        _interrupt()
+
+    rf.fly("hover-fault", settings={"duration": 0.1, "fault": []}).save(tmp_path / "flight.nc")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(place, name, begin)
+        done = run(*command, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (130, "rotorfault: interrupted\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.nc"]

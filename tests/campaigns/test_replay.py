@@ -94,13 +94,21 @@ def test_a_replay_warns_where_it_is_not_the_flight_of_the_table(changed: tuple[P
     with warnings.catch_warnings():
         warnings.simplefilter("error", ReplayWarning)
         campaign.replay(sound)
-        never_flown = sound + 2 * campaign.study.cells * len(campaign.study.variant)
-        campaign.replay(never_flown)  # nothing to compare with
     with pytest.warns(ReplayWarning, match=r"^cost is \S+ here and \S+ in the table$") as told:
         flight = campaign.replay(other)
     said = [str(one.message) for one in told if one.category is ReplayWarning]
     assert campaign.differences(other, flight) == said
     assert len(said) == 1
+
+
+def test_what_was_never_flown_is_not_replayed(changed: tuple[Path, list[int]]) -> None:
+    folder, flown = changed
+    campaign = rotorfault.Campaign(folder)
+    never = flown[0] + 2 * campaign.study.cells * len(campaign.study.variant)
+    span = f"allowed: the 2 of column 'id' of its table, {min(flown)} to {max(flown)}"
+    for identifier in (never, -1, 10**9):
+        with pytest.raises(rotorfault.InputError, match=f"has flown no flight {identifier}; {span}"):
+            campaign.replay(identifier)
 
 
 @needs_simd

@@ -118,7 +118,7 @@ def test_a_replay_writes_the_whole_flight(folder: Path) -> None:
         (["replay", "campaigns/tiny", "--flight", "1", "--set", "nope=1"], "nope"),
         (["replay", "nowhere", "--flight", "1"], "no such folder"),
         (["replay", "campaigns/tiny"], "give the flight by --flight ID, or by --cell and --variant"),
-        (["replay", "campaigns/tiny", "--flight", "99999999"], "there is no flight 99999999"),
+        (["replay", "campaigns/tiny", "--flight", "99999999"], "tiny has flown no flight 99999999; allowed: the"),
         (["replay", "campaigns/tiny", "--cell", "1"], "--cell needs --variant"),
         (
             ["replay", "campaigns/tiny", "--cell", "1", "--variant", "smx"],
@@ -167,3 +167,10 @@ def test_no_scheduler_is_one_clear_line(folder: Path) -> None:
     nowhere = ("--scheduler", "tcp://127.0.0.1:1", "--out", "new")
     assert_refused(started("campaign", "tiny.toml", *nowhere, cwd=folder, before=impatient), "cannot be reached")
     assert not (folder / "new").exists()
+
+
+def test_pages_that_are_kept_are_counted_in_words(folder: Path) -> None:
+    done = run("campaign", "--report-only", "--out", "campaigns/tiny", "--keep-flights", "1", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    said = "2 flight pages in campaigns/tiny/flights: one for each variant in the cell nearest to 50 %"
+    assert said in done.stdout

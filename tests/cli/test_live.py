@@ -38,6 +38,8 @@ def instant(rotors: int = 4, time: float = 2.0) -> Instant:
         loss=0.3 * flags,
         believed=0.28 * flags,
         flagged=flags,
+        stuck=np.full(rotors, np.nan),
+        stuck_believed=np.full(rotors, np.nan),
     )
 
 
@@ -56,6 +58,19 @@ def test_the_view_fits_any_terminal(size: tuple[int, int], rotors: int) -> None:
         assert "FLAGGED, believed  28 %, true loss  30 %" in text
         assert f"rotor {rotors}" in text
         assert shown[-1] == "event 8"
+
+
+def test_a_small_terminal_cuts_no_word() -> None:
+    event = "1.80 s  rotor 1 flagged, and more is said of it"
+    shown = lines(FLOWN, instant(), [event], 30, 10, ASCII)
+    text = "\n".join(shown)
+    assert "position error    0.500 m" in text
+    assert "roll +11 pitch -6 yaw +29 deg" in text
+    assert "rotor 1     50 % FLAGGED  28 %" in text
+    assert " ".join(text.split()).endswith("1.80 s rotor 1 flagged, and more is said of it")
+    assert all(len(line) <= 30 for line in shown)
+    long = FLOWN._replace(title="a flight of many words to tell")
+    assert lines(long, instant(), [], 20, 20)[0] == "a flight of many w.."
 
 
 def test_a_terminal_of_few_letters_gets_those() -> None:
@@ -228,3 +243,21 @@ def test_ctrl_c_ends_it_and_loses_nothing(tmp_path: Path) -> None:
     assert flight.outcome.kind == "interrupted"
     shown = float(first[1].split()[1]) if first[1].startswith("t ") else 0.0
     assert flight.outcome.time >= shown
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pipes of a shell")
+@pytest.mark.parametrize("looks", [["--live", "--live-speed", "1"], []])
+def test_a_pipe_that_closes_does_not_lose_the_flight(looks: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rotorfault", "fly", "paper-set-point", *SHORT, *looks, "--out", "l"]
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE.parent)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+                          env=environment) as process:  # fmt: skip
+        assert process.stdout is not None
+        assert process.stderr is not None
+        if looks:
+            assert process.stdout.readline().startswith("t ")
+        process.stdout.close()
+        assert "Error" not in process.stderr.read()
+    assert process.returncode == 1  # as of every command whose pipe closes
+    assert rf.load(tmp_path / "l" / "flight.nc").outcome.time == 2.5
+    assert (tmp_path / "l" / "summary.json").is_file()

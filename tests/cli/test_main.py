@@ -161,6 +161,38 @@ def test_trim_refuses_losses_that_are_none(losses: tuple[str, ...]) -> None:
     assert not done.stdout
 
 
+USAGE = [
+    ("export a.nc --every 1.5", "--every: got '1.5'; allowed: a whole number"),
+    ("animate a.nc --fps=abc", "--fps: got 'abc'; allowed: a number"),
+    ("campaign x --workers 0", "--workers: got '0'; allowed: a whole number from 1 on"),
+    ("ranges --seeds 101", "--seeds: got '101'; allowed: a whole number from 1 to 100"),
+    ("export", "FLIGHT.nc is missing: A flight file that 'rotorfault fly' wrote; see 'rotorfault export --help'"),
+    ("convert position 1 2 3 --from ned", "--to is missing: One of those that --from takes; see"),
+    ("convert position --from px4 --to ned", "position: no values came; give 3 after it (x, y, z), as in"),
+    ("fly --seed", "--seed needs a value after it; see 'rotorfault fly --help'"),
+    ("fly --no-figuers", "unknown option '--no-figuers'; did you mean '--no-figures'? (allowed: --controller,"),
+    ("fli", "unknown command 'fli'; did you mean 'fly'? (allowed: animate,"),
+    ("trim paper hummingbird", "'hummingbird' is too much (allowed: VEHICLE); see 'rotorfault trim --help'"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), USAGE)
+def test_a_command_line_that_is_none_is_refused_in_one_line(line: str, message: str) -> None:
+    assert_refused(run(*line.split()), f"rotorfault: {message}")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_refuses_in_one_line(name: str) -> None:
+    """An option that it has not, options that nothing follows, and no argument where one is needed."""
+    command = COMMANDS[name]
+    options = [one for one in command.params if one.param_type_name == "option" and not one.is_flag]
+    lines = [[one.opts[0]] for one in options]
+    lines += [[]] if any(one.required for one in command.params) else []
+    lines += [["--nonsense"]] if name != "convert" else []  # which takes that for a value
+    for line in lines:
+        assert_refused(run(name, *line), "rotorfault: ", f"; see 'rotorfault {name} --help'")
+
+
 # Arguments of `fly`, and what the one line of the error must name.
 BAD = [
     (("nowhere",), ["nowhere", "paper-set-point"]),
@@ -241,7 +273,9 @@ def test_truncated_files_are_refused(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for size in (0, 100, len(whole) // 2):
         path.write_bytes(whole[:size])
-        assert_refused(run("check", str(path)), "flight.nc")
+        assert_refused(run("check", str(path)), f"flight.nc: is cut or damaged ({size:,} bytes); restore a copy")
+    path.write_bytes(b"no flight at all")
+    assert_refused(run("check", str(path)), "flight.nc: is no flight file; give a flight.nc")
     toml = edited(tmp_path, "vehicle", "name", "name")
     Path(toml).write_text(Path(toml).read_text()[:300])
     assert_refused(run("check", toml), "mine.toml")

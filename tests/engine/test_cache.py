@@ -287,4 +287,6 @@ def test_structure_is_one_word_per_part() -> None:
     truth, belief = ["wind", "fault", "fault", "plant", "sensors"], ["estimator", "diagnosis", "on_fault"]
     assert slots == [*truth, *belief, "controller", "allocation"]
     assert "RigidBody" in parts[slots.index("plant")]
-    assert (substeps, floats) == ("1", "()"), "all parts are the package's own, whose floats are numbers"
+    assert (substeps, floats) == ("1 substeps, 4 rotors", "()"), (
+        "all parts are the package's own, whose floats are numbers"
+    )

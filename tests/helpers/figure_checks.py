@@ -51,6 +51,7 @@ def made_up(
         put(f"thrust_command.r{rotor}", 4.0 + np.sin(time + rotor))
         put(f"thrust.r{rotor}", (1.0 - loss * (time >= onset)) * (4.0 + np.sin(time + rotor)))
         put(f"expected_thrust.r{rotor}", 4.0)
+        put(f"diagnosis.stuck_thrust.r{rotor}", 0.0)
         put(f"diagnosis.threshold.r{rotor}", 4.0 * THRESHOLD * (1.0 + 0.5 * np.exp(-np.abs(time - onset) / 0.05)))
     # Nothing of this happens unless a test says so.
     for name in ("wind", "disturbance", "torque_unallocated", "given_up"):

@@ -9,7 +9,7 @@ import pytest
 from allocation_cases import PAPER
 
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, opposite_pairs
 
 SOUND = PerRotor.all(0.0)
 ROTORS = (1, 2, 3, 4)
@@ -30,7 +30,10 @@ def random_case(rng: np.random.Generator, floor: float = 0.3) -> tuple[Vehicle, 
     mass, sign = rng.uniform(0.02, 5.0), rng.choice([-1.0, 1.0])
     gain = rng.uniform(0.6, 1.4)
     most = mass * 9.81 * rng.uniform(1.05, 4.0) / (4.0 * gain)
+    places = [(float(r[k][0]), float(r[k][1])) for k in order]
+    signs = [sign if k < 2 else -sign for k in order]
     vehicle = PAPER._replace(
+        pairs=opposite_pairs(places, signs) or (),
         mass=mass,
         rotor_x=PerRotor.of(float(r[k][0]) for k in order),
         rotor_y=PerRotor.of(float(r[k][1]) for k in order),

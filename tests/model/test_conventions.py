@@ -71,6 +71,8 @@ def test_rates_turn_the_attitude_in_both_alike() -> None:
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_the_way_back_leads_to_the_start(kind: str) -> None:
     values = rng.normal(size=(5, 7, len(KINDS[kind].names)))
+    if kind == "quaternion":
+        values /= np.linalg.norm(values, axis=-1, keepdims=True)
     there = rf.convert(kind, values, "rotorfault", "ned")
     assert np.array_equal(rf.convert(kind, there, "ned", "rotorfault"), values)
     assert np.array_equal(rf.convert(kind, values, "ned", "ned"), values)
@@ -146,3 +148,18 @@ def test_corners_of_a_vehicle_follow_from_its_torques() -> None:
 def test_what_cannot_be_converted_is_refused(arguments: tuple[object, ...], message: str) -> None:
     with pytest.raises(rf.InputError, match=message):
         rf.convert(*arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "message"),
+    [
+        ("quaternion", [0.0, 0.0, 0.0, 0.0], "its norm is 0, so it is no attitude"),
+        ("quaternion", [[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]], "its norm is 1.41421; allowed: 1, up to 0.001"),
+        ("position", [1.0, float("nan"), 3.0], "got nan among its values; allowed: finite numbers"),
+        ("euler", [[0.0, 0.0, float("-inf")]], "got -inf among its values"),
+    ],
+)
+def test_what_is_no_value_is_refused_with_its_number(kind: str, values: list[float], message: str) -> None:
+    for target in ("ned", "rotorfault"):
+        with pytest.raises(rf.InputError, match=message):
+            rf.convert(kind, values, "rotorfault", target)

@@ -139,11 +139,9 @@ BAD = {
     "no descent": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 2.46"), "thrust_min", "2.453 N"),
     "unknown key": (changed("mass =", "masss ="), "masss", "unknown key; did you mean 'mass'"),
     "missing key": (re.sub("^gravity = .*", "", GOOD, flags=re.M), "gravity", "missing"),
-    "three rotors": (GOOD[: GOOD.rindex("[[rotor]]")], "rotor", "got 3 tables"),
-    "not opposite": (changed("x = { value = -0.16", "x = { value = -0.15"),
-                     r"rotor 2 \('rear left'\): x", "rotor 1 .*and rotor 2 .*opposite"),
-    "yaw of a pair": (changed('yaw = "-"', 'yaw = "+"'), r"rotor 2 \('rear left'\): yaw", "'-'; allowed: '\\+'"),
-    "yaw of both pairs": (GOOD.replace('yaw = "+"', 'yaw = "-"'), r"rotor 3 \('front left'\): yaw", "for all rotors"),
+    "two rotors": (GOOD[: GOOD.index("[[rotor]]", GOOD.index("rear left") + 20)], "rotor", "got 2 tables"),
+    "seventeen rotors": (GOOD + 13 * GOOD[GOOD.rindex("[[rotor]]") :], "rotor", "got 17 tables; allowed: 3 to 16"),
+    "all turn one way": (GOOD.replace('yaw = "+"', 'yaw = "-"'), "rotor", "cannot give yaw independently"),
     "yaw word": (changed('yaw = "-"', 'yaw = "left"'), r"rotor 1 \('front right'\): yaw", "'left'"),
     "rank loss": (re.sub(r"^y = { value = -?0.16", "y = { value = 0.0", GOOD, flags=re.M), "rotor", "independently"),
 }  # fmt: skip
@@ -175,7 +173,7 @@ def test_missing_files_and_names_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         load_vehicle(tmp_path / "none.toml")
     (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(InputError, match="is a directory"):
+    with pytest.raises(InputError, match="is a folder; give a file in it"):
         load_vehicle(tmp_path / "folder.toml")
     with pytest.raises(InputError, match="unknown vehicle 'papr'; did you mean 'paper'"):
         load_vehicle("papr")

@@ -209,3 +209,19 @@ def test_the_attainable_set_is_that_of_a_linear_program(opened: Any, page: Path)
         along = np.array([np.cos(angle), np.sin(angle)])
         best = linprog(-wrench[:, 1:3] @ along, A_eq=wrench[:, :1].T, b_eq=[15.0], bounds=bounds)
         assert corner @ along == pytest.approx(-best.fun, abs=1e-6)
+
+
+def test_each_flight_has_its_events_and_its_cuts_come_last(opened: Any, two: Path) -> None:
+    shown = opened(two)
+    groups = shown.ask("[...document.querySelectorAll('#events > li')].map((g) => g.innerText.split('\\n'))")
+    assert [group[0] for group in groups] == ["1 · ours", "2 · theirs"]
+    for group in groups:
+        minor = ["limit" in line or " cut " in line for line in group if "rotor" in line or " cut " in line]
+        assert minor == sorted(minor)
+
+
+def test_a_telephone_shows_headlines_of_several_flights_whole(opened: Any, two: Path) -> None:
+    shown = opened(two, width=390)
+    ends = "[...document.querySelectorAll('.facts.several div')].map((d) => d.getBoundingClientRect().right)"
+    assert max(shown.ask(ends)) <= 390
+    assert shown.ask("document.querySelector('#lanes').offsetHeight") <= 2 * 16

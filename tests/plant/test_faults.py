@@ -194,7 +194,7 @@ def test_times_and_losses_may_differ_between_the_flights_of_a_batch():
 @pytest.mark.parametrize(
     ("name", "settings", "key"),
     [
-        ("step", {"rotor": 5, "time": 1.0, "loss": 0.2}, "rotor"),
+        ("step", {"rotor": 17, "time": 1.0, "loss": 0.2}, "rotor"),
         ("step", {"rotor": 0, "time": 1.0, "loss": 0.2}, "rotor"),
         ("step", {"rotor": 1, "time": -1.0, "loss": 0.2}, "time"),
         ("step", {"rotor": 1, "time": 1.0, "loss": 1.2}, "loss"),

@@ -16,7 +16,7 @@ BELIEF = ("autopilot",)
 # Imports that may wait inside a function until they are needed, by module, and why.
 # A command of the command line loads what it runs when it is called, so that `--help` and `list` cost nothing.
 COMMANDS = tuple(
-    f"rotorfault.cli.{name}" for name in ("campaign", "convert", "export", "fly", "look", "studies", "tune")
+    f"rotorfault.cli.{name}" for name in ("campaign", "convert", "export", "fly", "frames", "look", "studies", "tune")
 )
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"
@@ -35,6 +35,10 @@ LAZY = {
     "rotorfault.campaigns.api": {
         "rotorfault.campaigns.report.report": "matplotlib and plotly take a second to load",
         "rotorfault.campaigns.report.kept": "brings what makes pages, which a campaign does not need",
+    },
+    "rotorfault.analysis.any_frame": {
+        "scipy": "is needed for frames without opposite pairs alone",
+        "scipy.optimize": "the same",
     },
     "rotorfault.model.vehicle_file": {"scipy.optimize": "is needed for frames without opposite pairs alone"},
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},

@@ -68,7 +68,7 @@ def test_pipes_and_devices_are_no_files_to_read(tmp_path: Path) -> None:
     for path in (pipe, Path("/dev/zero")):
         with pytest.raises(InputError, match="is a pipe, socket or device; give a regular file"):
             read_text(path)
-    with pytest.raises(InputError, match="is a directory"):
+    with pytest.raises(InputError, match="is a folder; give a file in it"):
         read_text(tmp_path)
     with pytest.raises(InputError, match="NUL"):
         read_text("a\0b")

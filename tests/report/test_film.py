@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import assert_refused, run
 from exported import flight, mean_flight
 from PIL import Image
 
@@ -99,10 +100,13 @@ def test_pictures_are_taken_at_true_times() -> None:
         ("a.gif", {"fps": 60.0}, "fps: got 60.0; allowed: a number from 1 to 50 pictures a second in a GIF"),
         ("a.mp4", {"fps": 0.0}, "fps: got 0.0; allowed: a number from 1 to 120 pictures a second"),
         ("a.gif", {"speed": float("nan")}, "speed: got nan; allowed: a number from 0.001 to 1000 times real time"),
-        ("a.gif", {"width": 100}, "width: got 100; allowed: a whole number from 320 to 3840 pixels"),
-        ("a.gif", {"width": 400.0}, "width: got 400.0; allowed: a whole number"),
-        ("a.gif", {"start": 3.0}, "from 3 s until 0.5 s there is no flight; it lasts from 0 to 0.498 s|to 0.5 s"),
-        ("a.gif", {"start": 0.3, "until": 0.2}, "from 0.3 s until 0.2 s there is no flight"),
+        ("a.gif", {"width": 100}, "width: got 100; allowed: an even whole number from 320 to 3840 pixels"),
+        ("a.gif", {"width": 400.0}, "width: got 400.0; allowed: an even whole number"),
+        ("a.gif", {"width": 321}, "width: got 321; allowed: an even whole number"),
+        ("a.gif", {"start": 3.0}, "start: got 3; allowed: a time of the flight, 0 to 0.5 s"),
+        ("a.gif", {"start": 0.3, "until": 0.2}, "until: got 0.2; allowed: a time after start, 0.3 s"),
+        ("a.gif", {"start": 0.2, "until": 0.2}, "until: got 0.2; allowed: a time after start, 0.2 s"),
+        ("a.gif", {"until": 9.0}, "until: got 9; allowed: a time of the flight, 0 to 0.5 s"),
         ("a.mp4", {"fps": 120.0, "speed": 0.001, "width": 320}, None),
         ("none/a.gif", {"until": 0.01}, "there is no folder"),
     ],
@@ -123,3 +127,22 @@ def test_mean_names_and_flights_of_one_record_are_drawn(tmp_path: Path) -> None:
     assert mean_flight().animate(tmp_path / "a.gif", fps=2.0, width=320).stat().st_size > 5000
     one = rf.Flight(flight().data.isel(time=slice(1)), flight().outcome, flight().scores)
     assert one.animate(tmp_path / "b.gif", fps=2.0, width=320).stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (["--fps", "0"], "--fps: got 0.0; allowed: a number from 1 to 50"),
+        (["--width", "319"], "--width: got 319; allowed: an even whole number"),
+        (["--from", "-1"], "--from: got -1.0; allowed: a number from 0"),
+        (["--from", "2", "--until", "1"], "--until: got 1; allowed: a time after --from, 2 s"),
+    ],
+)
+def test_the_command_refuses_options_by_their_names_before_it_reads(
+    option: list[str], message: str, tmp_path: Path
+) -> None:
+    assert_refused(run("animate", "none.nc", *option, cwd=tmp_path), f"rotorfault: {message}")
+
+
+def test_sizes_may_be_numbers_of_numpy() -> None:
+    assert Film(width=np.int64(400), fps=np.float32(20.0)).checked(gif=True).width == 400

@@ -92,10 +92,10 @@ def test_events_are_in_order_and_end_with_the_outcome() -> None:
 
 
 def test_a_fault_of_another_kind_is_told_with_its_settings() -> None:
-    fault = {"kind": "stuck", "rotor": 2, "time": 0.5, "thrust": 3.0}
+    fault = {"kind": "total", "rotor": 2, "time": 0.5}
     flight = rf.fly("hover-fault", settings={"duration": 1.0, "fault": [fault]})
     (begins,) = (event for event in events(flight.records()) if event.kind == "fault")
-    assert begins == Event(0.5, "fault", "fault of rotor 2 begins: stuck thrust 3", 2)
+    assert begins == Event(0.5, "fault", "fault of rotor 2 begins: total", 2)
 
 
 def test_a_flight_that_recorded_nothing_has_no_events() -> None:

@@ -80,6 +80,10 @@ def test_every_and_units_are_choices(flights: list[rf.Flight], tmp_path: Path) -
     table = pd.read_csv(flight.to_csv(tmp_path / "some.csv", every=7, units=False))
     assert np.array_equal(table["time"], flight.data["time"].values[::7])
     assert {"position_x", "attitude_yaw", "thrust_4"} <= set(table.columns)
+    assert (
+        flight.to_csv(tmp_path / "same.csv", every=np.int64(7), units=False).read_bytes()
+        == (tmp_path / "some.csv").read_bytes()
+    )
     for wrong in (0, -1, 1.5, True, "2", None):
         with pytest.raises(rf.InputError, match=r"every: got .*; allowed: a whole number of records, 1 or more"):
             flight.to_csv(tmp_path / "none.csv", every=wrong)  # type: ignore[arg-type]
@@ -115,8 +119,14 @@ def test_the_command_writes_what_python_writes(flights: list[rf.Flight], tmp_pat
         (["flight.nc", "--to", "csv", "--out", "."], ".: is a folder; give a file with --out, such as flight.csv"),
         (["flight.nc", "--to", "csv", "--out", "flight.nc"], "flight.nc: is the flight itself; give another file"),
         (["flight.nc", "--to", "csv", "--out", "no/where.csv"], "no/where.csv: there is no folder no; make it first"),
-        (["flight.nc", "--to", "csv", "--every", "0"], "every: got 0; allowed: a whole number of records, 1 or more"),
+        (
+            ["flight.nc", "--to", "csv", "--every", "0"],
+            "--every: got 0; allowed: a whole number of records, 1 or more",
+        ),
         (["none.nc", "--to", "csv"], "none.nc: no such file"),
+        (["none.nc", "--to", "csv", "--every", "0"], "--every: got 0"),  # before anything is read
+        (["flight.nc", "--to", "csv", "--out", "x.mat"], "x.mat: ends in .mat, and csv was asked for; allowed: .csv"),
+        ([".", "--to", "csv", "--out", "x.csv"], ".: is a folder; give flight.nc"),
     ],
 )
 def test_bad_input_is_one_clear_line(
@@ -125,3 +135,15 @@ def test_bad_input_is_one_clear_line(
     flights[0].save(tmp_path / "flight.nc")
     assert_refused(run("export", *arguments, cwd=tmp_path), message)
     assert [path.name for path in tmp_path.iterdir()] == ["flight.nc"]
+
+
+def test_python_refuses_what_the_command_refuses(flights: list[rf.Flight], tmp_path: Path) -> None:
+    with pytest.raises(rf.InputError, match=r"x\.MAT: ends in \.MAT, and csv was asked for; allowed: \.csv"):
+        flights[0].export(tmp_path / "x.MAT", "csv")
+    assert flights[0].export(tmp_path / "x.txt", "csv").is_file()
+    flights[0].save(tmp_path / "flight.nc")
+    with pytest.raises(rf.InputError, match=r"is a folder; give .*flight\.nc"):
+        rf.load(tmp_path)
+    (tmp_path / "none").mkdir()
+    with pytest.raises(rf.InputError, match=r"is a folder; give a \.nc file; there is none in it"):
+        rf.load(tmp_path / "none")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rotorfault as rf
+from rotorfault.base.errors import FileWarning
 from rotorfault.results import exporters
 from rotorfault.results.events import events
 from rotorfault.results.flight_data import FlightData
@@ -114,6 +115,11 @@ def test_mcap_has_what_foxglove_draws(flight: rf.Flight, tmp_path: Path) -> None
 def test_the_layout_for_foxglove_names_what_is_there(flight: rf.Flight, tmp_path: Path) -> None:
     path = flight.export(tmp_path / "a.mcap")
     layout = json.loads((tmp_path / "a.foxglove.json").read_text())
+    flight.export(path)  # the same once more
+    (tmp_path / "a.foxglove.json").write_text("somebody's own")
+    with pytest.warns(FileWarning, match=r"a\.foxglove\.json: was there already and is kept"):
+        flight.export(path)
+    assert (tmp_path / "a.foxglove.json").read_text() == "somebody's own"
     _, message = messages(path)["/flight"][0]
     paths = [each["value"] for panel in layout["configById"].values() for each in panel.get("paths", [])]
     assert len(paths) >= 17

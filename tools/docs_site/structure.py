@@ -40,6 +40,7 @@ CHILDREN: dict[str, list[str]] = {
         "diagnosis",
         "allocation",
         "attainable",
+        "frames",
         "riccati",
         "explanations/fair-comparison",
         "explanations/statistics",
@@ -79,14 +80,15 @@ API: dict[str, tuple[str, str, list[str]]] = {
     "before": (
         "Before a flight",
         "What a vehicle and a loop can do, known without flying.",
-        ["trim_report", "hover_margin", "torque_reserve", "critical_loss", "critical_pair"],
+        ["trim_report", "hover_margin", "torque_reserve", "critical_loss", "critical_pair", "acai",
+         "ControlAuthority", "critical_thrust_to_weight", "critical_loss_with"],
     ),
     "tune": ("Tune", "Search of gains.", ["tune", "Tuned"]),
     "files": (
         "Scenarios, vehicles, frames",
         "What a flight is made of, as files and as objects; and the conventions of others.",
         ["load_scenario", "scenario_names", "Scenario", "neighbour", "load_vehicle", "vehicle_names", "Vehicle",
-         "convert"],
+         "convert", "frame_names", "load_frame", "Frame"],
     ),
     "slots": (
         "Parts of your own",

@@ -4,9 +4,10 @@ import { element, onTheme, palette, shown } from './look.js';
 
 const DIRECTIONS = 144;
 
-/** Limits of each rotor's thrust in N with given losses. */
+/** Limits of each rotor's thrust in N with given losses; a loss that is { stuck: N } leaves that thrust alone. */
 function limits(vehicle, losses) {
   return losses.map((loss) => {
+    if (typeof loss === 'object') return [loss.stuck, loss.stuck];
     const share = (1 - Math.min(Math.max(loss, 0), 1)) * vehicle.gain;
     return [share * vehicle.thrust_min, share * vehicle.thrust_max];
   });
@@ -68,6 +69,12 @@ export function thrustAndYaw(vehicle, losses) {
   });
 }
 
+/** What is known of each rotor at a record: its loss, or at which thrust it is stuck. */
+function states(flight, loss, stuck, record) {
+  const held = flight.row(stuck, record) ?? [];
+  return (flight.row(loss, record) ?? flight.vehicle.rotors.map(() => 0)).map((value, k) => (Number.isFinite(held[k]) ? { stuck: held[k] } : value));
+}
+
 /** Two small charts of the attainable set of a flight. */
 export class AttainableSet {
   constructor(parent) {
@@ -107,8 +114,8 @@ export class AttainableSet {
     const { vehicle } = flight;
     if (!vehicle || vehicle.thrust_max === undefined) return;
     const none = vehicle.rotors.map(() => 0);
-    const truth = flight.row('loss_true', record) ?? none;
-    const belief = flight.row('loss_believed', record) ?? none;
+    const truth = states(flight, 'loss_true', 'stuck_true', record);
+    const belief = states(flight, 'loss_believed', 'stuck_believed', record);
     const asked = [flight.value('thrust_demand', 0, record), ...(flight.row('torque_demand', record) ?? [])];
     const thrusts = flight.row('thrust', record) ?? [];
     const given = [0, 1, 2, 3].map((axis) => thrusts.reduce((sum, f, i) => sum + f * vehicle.rotors[i].wrench[axis], 0));

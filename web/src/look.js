@@ -1,7 +1,10 @@
-// Colours and small helpers. The colours are those of Okabe and Ito (2008), which colour-blind readers tell apart.
+// Colours and small helpers. What curves and arrows stand for has the colours of Okabe and Ito (2008), flights have
+// others; colour-blind readers tell all of them apart (tests/pages/test_look.py).
 
-export const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
+const COLOURS = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9'];
 const BRIGHT = ['#4BA3E3', '#F0803C', '#2BC79A', '#E29BC4', '#F0B93A', '#7CCBF5'];
+const FLIGHTS = ['#002299', '#FF4444', '#8800FF', '#770000', '#665566', '#440055'];
+const BRIGHT_FLIGHTS = ['#2266AA', '#FFEE00', '#BB00FF', '#995533', '#887788', '#BBFFBB'];
 export const DASHES = [[], [8, 3, 2, 3], [2, 3], [10, 4], [6, 2, 2, 2, 2, 2], [1, 3]];
 
 let dark = false;
@@ -10,7 +13,10 @@ const listeners = [];
 export const isDark = () => dark;
 
 /** Colour of the flight of an index, as the theme has it. */
-export const colourOf = (index) => (dark ? BRIGHT : COLOURS)[index % COLOURS.length];
+export const colourOf = (index) => (dark ? BRIGHT_FLIGHTS : FLIGHTS)[index % FLIGHTS.length];
+
+/** Colour of a column of a signal, where a page has one flight. */
+export const colourOfColumn = (index) => (dark ? BRIGHT : COLOURS)[index % COLOURS.length];
 
 /** Colours by what they stand for, as the theme has them. */
 export function palette() {

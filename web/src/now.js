@@ -7,10 +7,15 @@ const ROWS = [
   ['position error', 'm', (f, i) => size(f.row('position_error', i))],
   ['speed', 'm/s', (f, i) => size(f.row('velocity', i))],
   ['tilt', '°', (f, i) => tilt(f.row('quaternion', i))],
-  ['yaw', '°', (f, i) => degrees(f.value('attitude', 2, i))],
+  ['yaw', '°', (f, i) => direction(f.value('attitude', 2, i))],
   ['yaw rate', '°/s', (f, i) => degrees(f.value('body_rates', 2, i))],
   ['wind', 'm/s', (f, i) => size(f.row('wind', i))],
 ];
+
+/** An angle within half a turn, in degrees: records count turns, people read a direction. */
+function direction(angle) {
+  return degrees(angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI)));
+}
 
 function size(row) {
   return row ? Math.hypot(...row) : NaN;
@@ -88,9 +93,11 @@ export class Now {
       command.style.left = share(of('thrust_command'));
       command.hidden = !Number.isFinite(of('thrust_command'));
       row.classList.toggle('flagged', of('fault_flag') > 0.5);
-      const [loss, belief] = [of('loss_true'), of('loss_believed')];
+      const [loss, belief, held, heldBelieved] = ['loss_true', 'loss_believed', 'stuck_true', 'stuck_believed'].map(of);
       const words = [`${shown(of('thrust'), 3)} N`];
-      if (loss > 0.0005 || belief > 0.0005) words.push(`lost ${Math.round(100 * loss)} %, believed ${Math.round(100 * belief)} %`);
+      const state = (stuck, lost) => (Number.isFinite(stuck) ? `stuck at ${shown(stuck, 3)} N` : `${Math.round(100 * lost)} %`);
+      if (Number.isFinite(held)) words.push(`${state(held)}, believed ${Number.isFinite(heldBelieved) ? state(heldBelieved) : `lost ${state(NaN, belief)}`}`);
+      else if (loss > 0.0005 || belief > 0.0005 || Number.isFinite(heldBelieved)) words.push(`lost ${state(NaN, loss)}, believed ${state(heldBelieved, belief)}`);
       const line = words.join(' · ');
       if (text.textContent !== line) text.textContent = line;
     });

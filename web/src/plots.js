@@ -1,7 +1,7 @@
 // The plots over time: drawn when they come into sight, with the page's time as a line, and the values at it in words.
 
 import uPlot from 'uplot';
-import { DASHES, colourOf, element, onTheme, palette, shown, unitText } from './look.js';
+import { DASHES, colourOf, colourOfColumn, element, onTheme, palette, shown, unitText } from './look.js';
 
 const HEIGHT = 150;
 
@@ -160,7 +160,7 @@ export class Plots {
       panel.curves.filter((curve) => flight.has(curve.signal)).map((curve, k) => {
         const look = { ...lookOf(curve.role) };
         if (curve.role === 'more') {
-          look.stroke = alone ? colourOf(k) : colourOf(index);
+          look.stroke = alone ? colourOfColumn(k) : colourOf(index);
           look.dash = DASHES[(alone ? Math.floor(k / 6) : k) % DASHES.length];
         } else if (!alone) {
           look.stroke = colourOf(index);

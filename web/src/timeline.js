@@ -5,6 +5,8 @@ import { colourOf, element, onTheme, palette, shown, sign } from './look.js';
 
 const WORDED = ['fault', 'alarm', 'false_alarm', 'isolated', 'switch', 'touch_down', 'end'];
 
+const AT_LAST = ['saturation', 'given_up'];
+
 function colourFor(kind) {
   const c = palette();
   return { fault: c.vermilion, alarm: c.purple, false_alarm: c.orange, isolated: c.green, cleared: c.soft, switch: c.blue, touch_down: c.green, end: c.ink, saturation: c.orange, given_up: c.vermilion }[kind];
@@ -160,29 +162,36 @@ export class Timeline {
     lane.style.height = `calc(${(rows + 1) * 1.3}rem + 8px)`;
   }
 
-  /** All events, to be read and to be gone to. */
+  /** All events, to be read and to be gone to; of several flights each has its own, limits and cuts at the end. */
   fill() {
     this.list.replaceChildren();
-    const all = this.flights.flatMap((flight, k) => flight.events.map((event) => [flight, k, event]));
-    all.sort(([, , a], [, , b]) => a.time - b.time);
-    for (const [flight, k, event] of all) {
-      const row = element('li');
-      const go = element('button', 'go');
-      go.type = 'button';
-      go.append(element('span', 'n', `${event.time.toFixed(3)} s`));
-      go.append(sign(event.kind, colourFor(event.kind)));
-      if (this.flights.length > 1) {
-        const which = element('span', 'lane-name', `${k + 1}`);
-        which.title = flight.label;
-        which.style.color = colourOf(k);
-        go.append(which);
+    const several = this.flights.length > 1;
+    this.list.classList.toggle('several', several);
+    this.flights.forEach((flight, k) => {
+      let parent = this.list;
+      if (several) {
+        const group = element('li');
+        const name = element('b', '', `${k + 1} · ${flight.label}`);
+        name.style.color = colourOf(k);
+        parent = element('ol');
+        group.append(name, parent);
+        this.list.append(group);
       }
-      go.append(element('span', '', event.text));
-      go.addEventListener('click', () => this.clock.seek(event.time));
-      row.append(go);
-      this.list.append(row);
-    }
-    if (!this.list.children.length) this.list.append(element('li', 'soft', 'nothing happened to any rotor'));
+      const aside = (event) => several && AT_LAST.includes(event.kind);
+      for (const event of [...flight.events].sort((a, b) => aside(a) - aside(b) || a.time - b.time)) parent.append(this.row(event));
+      if (!parent.children.length) parent.append(element('li', 'soft', 'nothing happened to any rotor'));
+    });
+  }
+
+  /** An event in words, which leads to its time. */
+  row(event) {
+    const row = element('li');
+    const go = element('button', 'go');
+    go.type = 'button';
+    go.append(element('span', 'n', `${event.time.toFixed(3)} s`), sign(event.kind, colourFor(event.kind)), element('span', '', event.text));
+    go.addEventListener('click', () => this.clock.seek(event.time));
+    row.append(go);
+    return row;
   }
 
   /** Go to the next event (1) or the one before (-1). */

@@ -1,8 +1,7 @@
-"""Attainable hover of frames without opposite pairs, by active sets: see `rotorfault.analysis.hover`.
+"""Attainable hover of frames without opposite pairs, by linear programs: see `rotorfault.analysis.hover`.
 
-What closed forms give for two opposite pairs is found here by raising one number while others stay what they are
-(`rotorfault.autopilot.allocation.nearest`), from thrusts that hold hover; on scalars or arrays of many cases. The
-steps are twice as many as rotors, with which it agrees with linear programs (tests/analysis/test_any_frame.py).
+What closed forms give for two opposite pairs is found here by programs over the thrusts of the rotors, each within
+its limits. Many cases are solved as one block-diagonal program by HiGHS; the same case is solved once.
 """
 
 from __future__ import annotations
@@ -10,91 +9,140 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rotorfault.autopilot.allocation.nearest import Limits, Push, Steps, limits_of, nearest, pushed
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.scalar import NAN, Scalar, absolute, both, clip, less_equal, minimum, negated, select, sqrt
-from rotorfault.model.effectiveness import WrenchRows, effectiveness
-from rotorfault.model.signals import Wrench
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorfault.maths.arrays import Array
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.vehicle import Vehicle
 
-BALANCED = 1e-6  # of the largest thrust of a rotor: torque over the length of its row that counts as none
+UP, ROLL, PITCH, YAW = range(4)
+MISSED = 1e-8  # of the largest thrust: what equations may be missed by and count as met
+MOST_AT_ONCE = 2000  # cases of one program: their time grows faster than their number
 
 
 class Frame(NamedTuple):
-    """Rotors of a vehicle with losses, holding hover as well as they can."""
+    """Different cases of rotors that are to hold hover, in units of the largest thrust of a rotor."""
 
-    vehicle: Vehicle
-    rows: WrenchRows  # each of length 1
-    lengths: tuple[Scalar, ...]  # of the rows, as they were
-    limits: Limits
-    needed: Scalar  # N
-    hover: PerRotor  # N: thrusts that come nearest to hover, tilt first
-    steps: int
+    rows: Array  # (cases, 4, rotors): effectiveness, each row of length 1
+    lengths: Array  # (cases, 4): of the rows, as they were
+    low: Array  # (cases, rotors)
+    high: Array
+    needed: Array  # (cases,)
+    unit: Array  # (cases,) N
+    place: NDArray[np.intp]  # which case each of those asked for is
+    shape: tuple[int, ...]  # of those asked for
 
-    @property
-    def tilt_held(self) -> Scalar:
-        """1 where there is no tilt torque."""
-        return both(self.none(self.rows.roll), self.none(self.rows.pitch))
-
-    def none(self, row: PerRotor, thrust: PerRotor | None = None) -> Scalar:
-        """1 where a row gives nothing with the thrusts of hover, or others in N."""
-        most = BALANCED * self.vehicle.rotor_gain * self.vehicle.thrust_max
-        return less_equal(absolute(row.dot(self.hover if thrust is None else thrust)), most)
-
-    def raised(self, thrust: PerRotor, row: PerRotor, held: tuple[PerRotor, ...], by: Scalar) -> PerRotor:
-        """Thrusts in N with a row's sum changed as far towards `by` [N] as can be, and those of others as it was."""
-        return pushed(thrust, Push(row, held), by, self.limits, self.steps)
+    def told(self, values: Array) -> Scalar:
+        """Numbers of the cases as those who asked have them: a float for one, else an array."""
+        found = values[self.place].reshape(self.shape)
+        return found if self.shape else float(found)
 
 
-def frame_of(vehicle: Vehicle, low: PerRotor, high: PerRotor, share: PerRotor, needed: Scalar) -> Frame:
-    """A frame in hover.
+def frame_of(vehicle: Vehicle, low: PerRotor, high: PerRotor, needed: Scalar) -> Frame:
+    """A frame in hover; numbers of it may be arrays of many cases.
 
     Parameters
     ----------
     vehicle : Vehicle
     low, high : PerRotor, N
         Least and largest thrust of each rotor.
-    share : PerRotor
-        Its effectiveness, 0 to 1.
     needed : scalar, N
         Thrust of hover.
     """
-    matrix, steps = effectiveness(vehicle), 2 * vehicle.rotors
-    limits = limits_of(low, high, share)
-    hover = nearest(matrix, Wrench(needed, zeros()), limits, Steps(steps, steps, steps))
-    lengths = tuple(sqrt(row.dot(row)) for row in matrix)
-    rows = WrenchRows(*(row * (1.0 / length) for row, length in zip(matrix, lengths, strict=True)))
-    return Frame(vehicle, rows, lengths, limits, needed, hover, steps)
+    columns = [x for row in effectiveness(vehicle) for x in row]
+    numbers = [*columns, *low, *high, needed, vehicle.rotor_gain * vehicle.thrust_max]
+    whole = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in numbers))
+    shape, count = whole[0].shape, vehicle.rotors
+    cases, place = np.unique(np.stack([x.ravel() for x in whole], axis=1), axis=0, return_inverse=True)
+    rows, unit = cases[:, : 4 * count].reshape(-1, 4, count), cases[:, -1]
+    lengths = np.linalg.norm(rows, axis=2)
+    low_, high_, needed_ = cases[:, 4 * count : 5 * count], cases[:, 5 * count : 6 * count], cases[:, -2]
+    scaled = rows / np.maximum(lengths, 1e-300)[:, :, None]
+    each = unit[:, None]
+    return Frame(scaled, lengths, low_ / each, high_ / each, needed_ / unit, unit, place.reshape(-1), shape)
+
+
+def optimum(frame: Frame, cost: Array, held: tuple[int, ...], right: Array) -> Array:
+    """Largest cost . F with some rows of the effectiveness held; -inf where that cannot be. In units of thrust.
+
+    Parameters
+    ----------
+    frame : Frame
+    cost : ndarray, shape (cases, rotors)
+    held : tuple of int
+        Rows that are held.
+    right : ndarray, shape (cases, held rows)
+        At what.
+    """
+    found = np.full(len(cost), -math.inf)
+    for first in range(0, len(cost), MOST_AT_ONCE):
+        part = slice(first, first + MOST_AT_ONCE)
+        rows, bounds = frame.rows[part][:, held], np.stack([frame.low[part], frame.high[part]], axis=2)
+        found[part] = _optima(cost[part], rows, right[part], bounds)
+    return found
+
+
+def _optima(cost: Array, rows: Array, right: Array, bounds: Array) -> Array:
+    cases, count = right.shape
+    # First as little help for each equation, either way, as there can be: with none it can be met.
+    help_ = np.broadcast_to(np.hstack([np.eye(count), -np.eye(count)]), (cases, count, 2 * count))
+    endless = np.broadcast_to([0.0, np.inf], (cases, 2 * count, 2))
+    price = np.hstack([np.zeros((cases, rows.shape[2])), np.ones((cases, 2 * count))])
+    x = _solved(price, np.concatenate([rows, help_], axis=2), right, np.concatenate([bounds, endless], axis=1))
+    possible = (x * price).sum(axis=1) < MISSED
+    found = np.full(cases, -math.inf)
+    if possible.any():
+        # What is met but for rounding is asked for as it is met.
+        met = np.einsum("ckr,cr->ck", rows, x[:, : rows.shape[2]])[possible]
+        best = _solved(-cost[possible], rows[possible], met, bounds[possible])
+        found[possible] = (cost[possible] * best).sum(axis=1)
+    return found
+
+
+def _solved(cost: Array, rows: Array, right: Array, bounds: Array) -> Array:
+    """Where each cost is least."""
+    from scipy import sparse
+    from scipy.optimize import linprog
+
+    cases = len(right)
+    answer = linprog(
+        cost.ravel(),
+        A_eq=sparse.bsr_matrix((rows, np.arange(cases), np.arange(cases + 1))),
+        b_eq=right.ravel(),
+        bounds=bounds.reshape(-1, 2),
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    if answer.status != 0:
+        raise ArithmeticError(f"linear program of the attainable set: {answer.message}")
+    return np.asarray(answer.x.reshape(cost.shape))
 
 
 class Reach(NamedTuple):
-    """Thrusts in N of a frame in balance: -inf where there is no balance."""
+    """Thrusts in N of a frame in balance: -inf and inf where there is no balance."""
 
     most_with_yaw: Scalar
     least_with_yaw: Scalar
     most_without_yaw: Scalar
     least_without_yaw: Scalar
-    yaw_torque: Scalar  # N m: left over in hover with tilt in balance
+    yaw_torque: Scalar  # N m: left over at least in hover with tilt in balance; NaN where that cannot be
 
 
 def reach(frame: Frame) -> Reach:
     """Largest and least thrust with tilt, or with all torques, in balance."""
-    up, roll, pitch, yaw = frame.rows
-    far = frame.limits.high.sum()
-    tilt = frame.tilt_held
-    most = frame.raised(frame.hover, up, (roll, pitch), far)
-    least = frame.raised(frame.hover, up, (roll, pitch), -far)
-    level = frame.raised(frame.hover, yaw, (roll, pitch), -yaw.dot(frame.hover))
-    all_ = both(tilt, frame.none(yaw, level))
-    most_level = frame.raised(level, up, (roll, pitch, yaw), far)
-    least_level = frame.raised(level, up, (roll, pitch, yaw), -far)
-    return Reach(
-        select(all_, most_level.sum(), -math.inf),
-        select(all_, least_level.sum(), math.inf),
-        select(tilt, most.sum(), -math.inf),
-        select(tilt, least.sum(), math.inf),
-        yaw.dot(frame.hover) * frame.lengths[3],
-    )
+    up, yaw, cases = frame.rows[:, UP], frame.rows[:, YAW], len(frame.rows)
+    ends: list[Array] = []
+    for held in ((ROLL, PITCH, YAW), (ROLL, PITCH)):
+        none = np.zeros((cases, len(held)))
+        for sign in (1.0, -1.0):
+            ends.append(sign * optimum(frame, sign * up, held, none) * frame.lengths[:, UP] * frame.unit)
+    hover = np.stack([np.zeros(cases), np.zeros(cases), frame.needed / frame.lengths[:, UP]], axis=1)
+    most, least = (sign * optimum(frame, sign * yaw, (ROLL, PITCH, UP), hover) for sign in (1.0, -1.0))
+    with np.errstate(invalid="ignore"):
+        left = np.where(most < least, np.nan, np.clip(0.0, least, most)) * frame.lengths[:, YAW] * frame.unit
+    return Reach(*(frame.told(x) for x in (*ends, left)))
 
 
 def least_thrust(frame: Frame, own: int, with_yaw: bool) -> Scalar:
@@ -109,29 +157,28 @@ def least_thrust(frame: Frame, own: int, with_yaw: bool) -> Scalar:
     with_yaw : bool
         Whether yaw is held.
     """
-    up, roll, pitch, yaw = frame.rows
-    held = (up, roll, pitch, yaw) if with_yaw else (up, roll, pitch)
-    carried = frame.none(up, frame.hover - PerRotor.all(frame.needed / frame.vehicle.rotors, frame.vehicle.rotors))
-    possible = both(frame.tilt_held, carried)
-    if with_yaw:
-        possible = both(possible, frame.none(yaw))
-    one = PerRotor.of(1.0 if k == own else 0.0 for k in range(frame.vehicle.rotors))
-    lowest = frame.raised(frame.hover, one, held, -frame.hover[own])
-    return select(possible, lowest[own], NAN)
+    held = (UP, ROLL, PITCH, YAW) if with_yaw else (UP, ROLL, PITCH)
+    cost = np.zeros(frame.low.shape)
+    cost[:, own] = -1.0
+    least = -optimum(frame, cost, held, _hover(frame, len(held)))
+    return frame.told(np.where(np.isinf(least), np.nan, least * frame.unit))
 
 
 def reserve(frame: Frame, with_yaw: bool) -> Vec3:
     """Largest torque in N m about each body axis, either way, at the thrust of hover; 0 where there is no hover."""
-    rows = frame.rows
-    up, torques = rows.thrust, (rows.roll, rows.pitch, rows.yaw)
-    far = 2.0 * frame.limits.high.sum()
-    found: list[Scalar] = []
-    for axis, row in enumerate(torques):
-        if axis == 2 and not with_yaw:
-            found.append(0.0)
+    found = []
+    for axis in (ROLL, PITCH, YAW):
+        if axis == YAW and not with_yaw:
+            found.append(np.zeros(len(frame.rows)))
             continue
-        others = tuple(other for k, other in enumerate(torques) if k != axis and (with_yaw or k != 2))
-        ways = [row.dot(frame.raised(frame.hover, row, (up, *others), sign * far)) for sign in (1.0, -1.0)]
-        found.append(clip(minimum(ways[0], -ways[1]), 0.0, math.inf) * frame.lengths[1 + axis])
-    possible = frame.tilt_held if not with_yaw else both(frame.tilt_held, frame.none(rows.yaw))
-    return Vec3(*(select(negated(possible), 0.0, torque) for torque in found))
+        held = tuple(k for k in (UP, ROLL, PITCH, YAW) if k != axis and (with_yaw or k != YAW))
+        row, right = frame.rows[:, axis], _hover(frame, len(held))
+        most = np.minimum(*(optimum(frame, sign * row, held, right) for sign in (1.0, -1.0)))
+        found.append(np.maximum(most, 0.0) * frame.lengths[:, axis] * frame.unit)
+    return Vec3(*(frame.told(torque) for torque in found))
+
+
+def _hover(frame: Frame, held: int) -> Array:
+    right = np.zeros((len(frame.rows), held))
+    right[:, 0] = frame.needed / frame.lengths[:, UP]
+    return right

@@ -14,7 +14,7 @@ along an axis tilted into the wind. In the sums and differences of the rotor pai
 - *yaw held*: f_12 = f_34 besides, the thrust is anything in [4 max(a, c), 4 min(b, d)];
 - *spinning*: no balance at all, sum lo_i to sum hi_i.
 
-For frames without opposite pairs the same is found by active sets (`rotorfault.analysis.any_frame`).
+For frames without opposite pairs the same is found by linear programs (`rotorfault.analysis.any_frame`).
 
 What the three mean. *Held* is rest with all torques in balance. *Given up* is balance of force and tilt torque: the
 thrust axis can stand still while the body turns about it, which costs no tilt torque at any rate; the yaw torque
@@ -116,7 +116,7 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
     ranges = _thrust_ranges(vehicle, loss)
     needed, upright = _needed(vehicle, wind_W)
     if vehicle.pairs == ():
-        return _any_margin(vehicle, any_frame.frame_of(vehicle, *ranges, 1.0 - loss, needed), upright)
+        return _any_margin(vehicle, ranges, needed, upright)
     low, high = (in_pairs(vehicle, ends) for ends in ranges)
     room = _room(vehicle)
     a, b = maximum(low.r1, low.r2), minimum(high.r1, high.r2)
@@ -150,11 +150,10 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
     )
 
 
-def _any_margin(vehicle: Vehicle, frame: any_frame.Frame, upright: Scalar) -> HoverMargin:
+def _any_margin(vehicle: Vehicle, ranges: tuple[PerRotor, PerRotor], needed: Scalar, upright: Scalar) -> HoverMargin:
     """The same for a frame without opposite pairs."""
-    found, needed = any_frame.reach(frame), frame.needed
-    spinning = frame.limits.high.sum()
-    room = any_frame.BALANCED * vehicle.rotor_gain * vehicle.thrust_max
+    found = any_frame.reach(any_frame.frame_of(vehicle, *ranges, needed))
+    spinning, room = ranges[1].sum(), any_frame.MISSED * vehicle.rotor_gain * vehicle.thrust_max
 
     def possible(least: Scalar, most: Scalar) -> Scalar:
         return both(upright, both(less_equal(least, needed + room), less_equal(needed, most + room)))
@@ -213,7 +212,10 @@ def critical_loss(
     needed, upright = _needed(vehicle, wind_W)
     if vehicle.pairs == ():
         others = PerRotor.of(0.0 if k == own else x for k, x in enumerate(loss))
-        frame = any_frame.frame_of(vehicle, *_thrust_ranges(vehicle, others), 1.0 - others, needed)
+        low, high = _thrust_ranges(vehicle, others)
+        # Whatever it is commanded, with a loss it gives as little as is asked for.
+        low = PerRotor.of(0.0 if k == own else x for k, x in enumerate(low))
+        frame = any_frame.frame_of(vehicle, low, high, needed)
         left = any_frame.least_thrust(frame, own, yaw) / (vehicle.rotor_gain * vehicle.thrust_max)
         return select(upright, clip(1.0 - left, 0.0, 1.0), NAN)
     low, high = _thrust_ranges(vehicle, loss)
@@ -291,7 +293,7 @@ def torque_reserve(vehicle: Vehicle, loss: PerRotor, yaw: bool = True, wind_W: V
     ranges = _thrust_ranges(vehicle, loss)
     needed, upright = _needed(vehicle, wind_W)
     if vehicle.pairs == ():
-        reserve = any_frame.reserve(any_frame.frame_of(vehicle, *ranges, 1.0 - loss, needed), yaw)
+        reserve = any_frame.reserve(any_frame.frame_of(vehicle, *ranges, needed), yaw)
         return Vec3(*(upright * torque for torque in reserve))
     low, high = (in_pairs(vehicle, ends) for ends in ranges)
     x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)

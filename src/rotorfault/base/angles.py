@@ -28,6 +28,17 @@ def in_radians(value: float, unit: str = "rad") -> str:
     return f"{value:g} {unit}, which is {math.degrees(value):.6g} {degrees}"
 
 
+def wrapped(angle: float) -> float:
+    """An angle in rad as people read it, within half a turn: how often something has turned is no direction.
+
+    Parameters
+    ----------
+    angle : float
+        In rad; what is no finite number stays.
+    """
+    return math.remainder(angle, TURN) if math.isfinite(angle) else angle
+
+
 @final
 class Radians:
     """Refuses what is beyond -+ `most`, and says what it would be if degrees were meant.

@@ -60,6 +60,10 @@ class ControllerWarning(UserWarning):
     """A controller's gains are too fast for rotors or sampling, are for other rotors, or make commands rattle."""
 
 
+class FileWarning(UserWarning):
+    """A file was not written, because another one is there that may be somebody's work."""
+
+
 class VehicleWarning(UserWarning):
     """A vehicle's numbers are possible, but hardly meant, or hardly fit to fly."""
 

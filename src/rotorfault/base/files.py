@@ -139,6 +139,38 @@ def output_folder(path: Path) -> Path:
     return path
 
 
+@contextmanager
+def made_folder(path: Path) -> Iterator[Path]:
+    """Make a folder for results that are still to be computed; what comes to nothing leaves none behind.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written.
+    """
+    new = [place for place in (path, *path.parents) if not place.exists()]
+    try:
+        yield output_folder(path)
+    except BaseException:
+        for place in new:
+            with contextlib.suppress(OSError):  # it holds something
+                place.rmdir()
+        raise
+
+
+def instead_of_folder(folder: Path, ending: str) -> str:
+    """What is said of a folder that was given for a file: which file in it may be meant.
+
+    Parameters
+    ----------
+    folder : Path
+    ending : str
+        Of the file that is wanted.
+    """
+    names = sorted(path.name for path in folder.glob(f"*{ending}"))
+    return f"is a folder; {f'give {folder / names[0]}' if names else f'give a {ending} file; there is none in it'}"
+
+
 def read_plain(path: Path) -> bytes:
     """The content of a plain file; a pipe would be waited for, and a device may never end.
 

@@ -60,14 +60,28 @@ def held_back() -> Iterator[None]:
 
     A process that is starting cannot yet say what Ctrl-C means to it, and would print where it was.
     """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    late = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal late
+        late = True
+
+    # Blocked for children, which inherit that, and noted for threads, which may take the signal in our place.
+    handler = signal.getsignal(signal.SIGINT)
+    ours = callable(handler) and threading.current_thread() is threading.main_thread()
+    if ours:
+        signal.signal(signal.SIGINT, note)
+    blocks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blocks else set()
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if blocks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if ours:
+            signal.signal(signal.SIGINT, handler)
+    if late:
+        signal.raise_signal(signal.SIGINT)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:

@@ -152,6 +152,7 @@ class Campaign:
         InputError
             If there is no such flight, a value is not allowed, or it needs code that is not allowed.
         """
+        self.require_flown(identifier)
         changes = replay_changes(controller, settings)
         flight = replay(self.study, identifier, changes)
         if not changes or not is_changed(self.study, identifier, changes):
@@ -159,12 +160,34 @@ class Campaign:
                 warnings.warn(line, ReplayWarning, stacklevel=2)
         return flight
 
+    def require_flown(self, identifier: int) -> None:
+        """Refuse what is no flight of the table.
+
+        Parameters
+        ----------
+        identifier : int
+            Column ``id`` of the table.
+
+        Raises
+        ------
+        InputError
+            If no flight that was flown has it.
+        """
+        found = self._store.table()["id"]
+        if not pc.any(pc.equal(found, identifier)).as_py():
+            span = pc.min_max(found).as_py()
+            there = f", {span['min']} to {span['max']}" if len(found) else ""
+            raise InputError(
+                f"{self.study.name} has flown no flight {short(identifier)}; allowed: the {len(found):,} of column "
+                f"'id' of its table{there}"
+            )
+
     def is_changed(self, identifier: int, changes: Mapping[str, Any]) -> bool:
         """Whether changes, as `replay_changes` gives them, make another flight of one of the table."""
         return is_changed(self.study, identifier, changes)
 
     def differences(self, identifier: int, flight: Flight) -> list[str]:
-        """What of a replayed flight is not as in the table; empty where all agrees, or it was never flown.
+        """What of a replayed flight is not as in the table; empty where all agrees.
 
         Parameters
         ----------
@@ -175,8 +198,6 @@ class Campaign:
         """
         table = self._store.table()
         rows = table.filter(pc.equal(table["id"], identifier)).to_pylist()
-        if not rows:
-            return []
         lines = differences(rows[0], flight.scores)
         there, here = self._store.identity.own, {} if flight.scenario is None else sources_of(flight.scenario)
         other = [place for place, digest in here.items() if digest != there.get(place)]
@@ -254,7 +275,8 @@ def campaign(
     InputError
         If an argument cannot be used; nothing has been flown then.
     KeyboardInterrupt
-        On Ctrl-C; what is done is kept in the folder.
+        On Ctrl-C. What is done is kept in the folder, which is its argument; it has none where there is no campaign
+        to resume yet.
     """
     if isinstance(study, Study):
         checked = study
@@ -273,12 +295,15 @@ def campaign(
     run.check(checked)
     executor = executor_of(workers, scheduler)
     complete = not (resume or repair) and run.is_complete(checked, folder)
-    with run.open_store(checked, folder, resume or complete, repair) as store:
-        for damage in store.repaired:
-            say(f"moved aside: {damage.name} ({damage.reason})")
-        for scenario in () if complete else checked.scenarios:
-            doubts.warn(scenario, varied=True)
-        progress = run.fly(checked, store, executor, say)
+    try:
+        with run.open_store(checked, folder, resume or complete, repair) as store:
+            for damage in store.repaired:
+                say(f"moved aside: {damage.name} ({damage.reason})")
+            for scenario in () if complete else checked.scenarios:
+                doubts.warn(scenario, varied=True)
+            progress = run.fly(checked, store, executor, say)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(*[str(folder)] * (folder / STUDY).is_file()) from None
     table = folder / FLIGHTS
     if progress.flights:
         say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")

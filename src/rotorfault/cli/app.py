@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -74,7 +75,7 @@ def _root(
 
 
 def finish(flight: Flight, folder: Path, figures: bool, page: bool = False) -> None:
-    """Print the numbers of a flight and write its files.
+    """Write the files of a flight and print its numbers; neither a closed pipe nor Ctrl-C loses what was flown.
 
     Parameters
     ----------
@@ -86,8 +87,17 @@ def finish(flight: Flight, folder: Path, figures: bool, page: bool = False) -> N
     page : bool
         Whether the flight's page is written.
     """
-    say(str(flight.summary()))
-    written = flight.write(folder, with_figures=figures, with_page=page)
+
+    def tell() -> None:
+        with contextlib.suppress(BrokenPipeError):  # told again below, once all is written
+            say(str(flight.summary()))
+
+    try:
+        written = flight.write(folder, figures, page, tell)
+    except KeyboardInterrupt:
+        if flight.source:
+            raise stopped(f"interrupted; {folder} holds the flight, but not all that was to be made of it") from None
+        raise
     say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
     if flight.outcome.kind == "interrupted":
         raise stopped(f"interrupted; {folder} holds the flight up to {flight.outcome.time:g} s")

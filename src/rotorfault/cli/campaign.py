@@ -107,7 +107,9 @@ def campaign(
             vehicle=vehicle, preset=presets, seed=seed, budget=budget, workers=workers, scheduler=scheduler,
             say=lambda line: say(line, err=True), allow_code=allow_code,
         )  # fmt: skip
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
+        if not stop.args:  # before there was a folder
+            raise
         raise stopped("interrupted; what is done is kept, go on with the same command and --resume") from None
     _keep(done, keep_flights)
     if report:
@@ -144,9 +146,8 @@ def replay(
 
     Example: rotorfault replay campaigns/partial-loss-map --cell 120 --variant smc --controller sdre
     """
-    from rotorfault.base.files import output_folder
+    from rotorfault.base.files import made_folder
     from rotorfault.campaigns.api import Campaign, replay_changes
-    from rotorfault.campaigns.flight_set import flight_of
     from rotorfault.campaigns.replay import identifier_of
     from rotorfault.scenario.overrides import parse_overrides
 
@@ -161,15 +162,15 @@ def replay(
         if variant is None:
             raise InputError("--cell needs --variant: " + ", ".join(one.label for one in study.variant))
         flight = identifier_of(study, variant, cell, number)
+    campaign.require_flown(flight)  # refused before a folder is made for it
     changes = replay_changes(controller, settings)
     changed = bool(changes) and campaign.is_changed(flight, changes)
-    flight_of(study, flight)  # refused before a folder is made for it
     target = out or folder.with_name(f"{folder.name}-replays") / (f"{flight}-changed" if changed else str(flight))
-    output_folder(target)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # told below, in lines of their own
-        flown = campaign.replay(flight, controller=controller, settings=settings)
-    finish(flown, target, figures, view)
+    with made_folder(target):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # told below, in lines of their own
+            flown = campaign.replay(flight, controller=controller, settings=settings)
+        finish(flown, target, figures, view)
     if changed:
         named = ", ".join(f"{key} = {short(value)}" for key, value in changes.items())
         say(f"not the flight of the table, but with {named}")
@@ -191,7 +192,9 @@ def _keep(campaign: Campaign, cells: int | None) -> None:
         pages = campaign.keep_flights(cells)
     except KeyboardInterrupt:
         raise stopped("interrupted; the pages that were made are kept, so are all flights") from None
-    say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}")
+    places = f"in each of the {cells} cells" if cells > 1 else "in the cell"
+    each = f"one for each variant {places} nearest to 50 % success, where it was flown"
+    say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}: {each}")
 
 
 def _report(campaign: Campaign, page: Path | None = None) -> None:

@@ -6,12 +6,15 @@ Lines are made for the width and height that there are: what does not fit is lef
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
 
+from rotorfault.base.angles import wrapped
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.results.derived import stuck_text
 
 COLUMNS, ROWS = 25, 7  # of the horizon
 FIELD = 40.0  # degrees of pitch from its lowest to its highest row
@@ -47,6 +50,8 @@ class Instant(NamedTuple):
     loss: Array  # (rotors,), true
     believed: Array  # (rotors,)
     flagged: Array  # (rotors,), 0 or 1
+    stuck: Array  # (rotors,), N: what a rotor gives that is stuck; NaN for others
+    stuck_believed: Array  # (rotors,), the same as believed
 
 
 class Flown(NamedTuple):
@@ -75,13 +80,17 @@ def lines(
     """
     share = now.time / flown.duration if flown.duration > 0.0 else 1.0
     clock = f"t {now.time:.2f} of {flown.duration:g} s, {flown.speed:g} x real time"
-    head = [one_line(flown.title), f"{bar(share, max(width - len(clock) - 1, 0), signs)} {clock}".strip()]
+    head = [
+        _cut(one_line(flown.title), width),
+        f"{bar(share, max(width - len(clock) - 1, 0), signs)} {clock}".strip(),
+    ]
     rotors = _rotors(flown, now, width, signs)
-    numbers = _numbers(now, signs)
+    numbers = [_fitting(forms, width) for forms in _numbers(now, signs)]
     picture = horizon(float(now.attitude[0]), float(now.attitude[1]), signs)
-    words = [one_line(text) for text in said]
+    words = [line for text in said for line in wrap(one_line(text), max(width, 1), subsequent_indent="  ")]
     # From all there is to what matters most.
-    beside = [f"{p}   {n}" for p, n in zip(picture, [*numbers, *[""] * ROWS], strict=False)]
+    whole = [forms[0] for forms in _numbers(now, signs)]
+    beside = [f"{p}   {n}" for p, n in zip(picture, [*whole, *[""] * ROWS], strict=False)]
     view = beside if width >= NARROW else numbers
     if len(head) + len(view) + len(rotors) + 2 > height - 1:
         view = numbers
@@ -93,7 +102,17 @@ def lines(
         room = height - 1 - len(head) - len(view) - len(rotors)
     last = words[-max(min(room, 5), 0) :] if room > 0 else []
     found = [*head, *view, *rotors, *last]
-    return [line[:width] for line in found[: max(height - 1, 1)]]
+    return [_cut(line, width) for line in found[: max(height - 1, 1)]]
+
+
+def _cut(text: str, width: int) -> str:
+    """A text in so many columns; where words are lost, dots say so."""
+    return text if len(text) <= width else f"{text[: max(width - 2, 0)].rstrip()}.."[:width]
+
+
+def _fitting(forms: Sequence[str], width: int) -> str:
+    """The first form of a line that fits, else the shortest."""
+    return next((form for form in forms if len(form) <= width), forms[-1])
 
 
 def bar(share: float, length: int, signs: Signs, mark: float | None = None) -> str:
@@ -146,44 +165,64 @@ def horizon(roll: float, pitch: float, signs: Signs) -> list[str]:
     return rows
 
 
-def _numbers(now: Instant, signs: Signs) -> list[str]:
-    roll, pitch, yaw = np.degrees(now.attitude)
+def _numbers(now: Instant, signs: Signs) -> list[tuple[str, ...]]:
+    """Lines of numbers, each in forms for wide and for narrow terminals."""
+    roll, pitch, yaw = _degrees(now)
     x, y, z = now.position
     a, b, c = now.position - now.wanted
     degree = signs.degree
+    off = float(np.linalg.norm(now.position - now.wanted))
     return [
-        f"position error {np.linalg.norm(now.position - now.wanted):8.3f} m",
-        f"attitude  roll {roll:+6.1f}{degree}  pitch {pitch:+6.1f}{degree}  yaw {yaw:+6.1f}{degree}",
-        f"errors     x {a:+8.3f}   y {b:+8.3f}   z {c:+8.3f} m",
-        f"position   x {x:+8.3f}   y {y:+8.3f}   z {z:+8.3f} m",
-        f"speed        {now.speed:8.3f} m/s",
+        (f"position error {off:8.3f} m", f"error {off:.3g} m"),
+        (
+            f"attitude  roll {roll:+6.1f}{degree}  pitch {pitch:+6.1f}{degree}  yaw {yaw:+6.1f}{degree}",
+            f"roll {roll:+.0f} pitch {pitch:+.0f} yaw {yaw:+.0f} deg",
+            f"{roll:+.0f} {pitch:+.0f} {yaw:+.0f} deg",
+        ),
+        (f"errors     x {a:+8.3f}   y {b:+8.3f}   z {c:+8.3f} m", f"off by {a:+.3g} {b:+.3g} {c:+.3g} m"),
+        (f"position   x {x:+8.3f}   y {y:+8.3f}   z {z:+8.3f} m", f"at {x:+.3g} {y:+.3g} {z:+.3g} m"),
+        (f"speed        {now.speed:8.3f} m/s", f"speed {now.speed:.3g} m/s"),
     ]
+
+
+def _degrees(now: Instant) -> Array:
+    """Roll, pitch and yaw in degrees, each within half a turn."""
+    angles: Array = np.degrees([wrapped(float(angle)) for angle in now.attitude])
+    return angles
 
 
 def _rotors(flown: Flown, now: Instant, width: int, signs: Signs) -> list[str]:
     """A line for each rotor: thrust as a bar, the command as a mark in it, losses."""
     wide = width >= NARROW
-    found = []
-    for k, thrust in enumerate(now.thrust):
-        words = f" true loss {100.0 * now.loss[k]:3.0f} %" if wide else ""
+    said = []
+    for k in range(len(now.thrust)):
+        held = bool(np.isfinite(now.stuck[k]))
+        true = f"true: {stuck_text(now.stuck[k])}" if held else f"true loss {100.0 * now.loss[k]:3.0f} %"
+        words = f" {true}" if wide else ""
         if now.flagged[k] > 0.5:
-            flag = "FALSE ALARM" if now.loss[k] <= 0.0 else "FLAGGED"
-            believed = f"{100.0 * now.believed[k]:3.0f} %"
+            flag = "FLAGGED" if held or now.loss[k] > 0.0 else "FALSE ALARM"
+            believed = _believed(now, k)
             words = f" {flag}, believed {believed},{words}" if wide else f" {flag} {believed}"
+        said.append(words)
+    head, room = "rotor {:<2}", max(41 if wide else 18, *map(len, said)) + 16
+    found = []
+    for k, (thrust, words) in enumerate(zip(now.thrust, said, strict=True)):
         share, command = thrust / flown.thrust_max, now.command[k] / flown.thrust_max
-        head = f"rotor {k + 1:<2}"
-        length = min(width - len(head) - 49, 40) if wide else width - len(head) - 26
-        drawn = bar(share, length, signs, command)
-        found.append(f"{head} {drawn} {100.0 * share:4.0f} %{words}")
+        drawn = bar(share, min(width - room, 40) if wide else width - room, signs, command)
+        found.append(f"{head.format(k + 1)} {drawn} {100.0 * share:4.0f} %{words}")
     return found
+
+
+def _believed(now: Instant, k: int) -> str:
+    """What a flagged rotor is believed to have lost, or to be stuck at."""
+    held = float(now.stuck_believed[k])
+    return stuck_text(held) if np.isfinite(held) else f"{100.0 * now.believed[k]:3.0f} %"
 
 
 def one_liner(now: Instant) -> str:
     """An instant in a line, where there is no terminal."""
-    roll, pitch, yaw = np.degrees(now.attitude)
-    flags = [
-        f"rotor {k + 1} {100.0 * now.believed[k]:.0f} %" for k in range(len(now.flagged)) if now.flagged[k] > 0.5
-    ]
+    roll, pitch, yaw = _degrees(now)
+    flags = [f"rotor {k + 1} {_believed(now, k).strip()}" for k in range(len(now.flagged)) if now.flagged[k] > 0.5]
     x, y, z = now.position
     error = float(np.linalg.norm(now.position - now.wanted))
     return (

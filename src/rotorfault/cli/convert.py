@@ -20,8 +20,10 @@ def convert(
         ),
     ],
     values: Annotated[
-        list[str], typer.Argument(metavar="VALUE", help="Its components, or a value for each of motors 1 to 4.")
-    ],
+        list[str] | None,
+        typer.Argument(metavar="VALUE", help="Its components, or a value for each of motors 1 to 4."),
+    ] = None,
+    *,
     source: Annotated[
         str,
         typer.Option(
@@ -31,7 +33,7 @@ def convert(
             "quadrotor by name or file.",
         ),
     ],
-    target: Annotated[str, typer.Option("--to", metavar="CONVENTION", help="The same.")],
+    target: Annotated[str, typer.Option("--to", metavar="CONVENTION", help="One of those that --from takes.")],
 ) -> None:
     """Convert a value, or the order of motors, between rotorfault's conventions and those of autopilots.
 
@@ -42,6 +44,12 @@ def convert(
     from rotorfault.base.text_table import table_lines
     from rotorfault.model import conventions
 
+    if not values:
+        names = conventions.components(kind)
+        example = f"rotorfault convert {kind} {' '.join('1000'[: len(names)])}"
+        raise InputError(
+            f"{kind}: no values came; give {len(names)} after it ({', '.join(names)}), as in '{example}'"
+        )
     numbers = [_number(text) for text in values]
     found = [f"{number:.12g}" for number in conventions.convert(kind, numbers, source, target)]
     given = [f"{number:.12g}" for number in numbers]

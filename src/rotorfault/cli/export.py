@@ -10,6 +10,9 @@ import typer
 from rotorfault.base.errors import InputError
 from rotorfault.cli.app import app, say
 
+OPTIONS = {"start": "--from"} | {name: f"--{name}" for name in ("speed", "fps", "width", "until")}
+"""What the parameters of a film are called here."""
+
 
 @app.command()
 def export(
@@ -42,9 +45,11 @@ def export(
 
     if to is None and out is None:
         raise InputError(f"--to: is missing; allowed: {', '.join(exporters.FORMATS)}; or give --out with an ending")
-    form = exporters.form_of(out) if to is None and out is not None else str(to)
+    form = str(to) if out is None else exporters.format_of(out, to)
     exporters.writer_of(form)
-    written = exporters.write(load(flight).records(), exporters.target_of(form, flight, out), form, every, units)
+    step = exporters.whole_every(every, "--every")
+    target = exporters.target_of(form, flight, out)
+    written = exporters.write(load(flight).records(), target, form, step, units)
     say("\n".join(f"wrote {path}" for path in written))
 
 
@@ -68,9 +73,10 @@ def animate(
     Example: rotorfault animate results/calm/flight.nc -o calm.mp4 --speed 0.5 --until 4
     """
     from rotorfault.flight.flight import load
+    from rotorfault.report.film import Film, require_kind
 
     target = out or flight.with_suffix(".gif")
     if target.is_dir():
         raise InputError(f"{target}: is a folder; give a file with --out, such as {target / 'flight.gif'}")
-    written = load(flight).animate(target, speed=speed, fps=fps, width=width, start=start, until=until)
-    say(f"wrote {written}")
+    film = Film(speed, fps, width, start, until, names=OPTIONS).checked(require_kind(target))
+    say(f"wrote {load(flight).film(target, film)}")

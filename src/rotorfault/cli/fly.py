@@ -54,7 +54,7 @@ def fly(
 
     Example: rotorfault fly paper-set-point --controller smc --set wind.kind=none --out results/calm
     """
-    from rotorfault.base.files import output_folder
+    from rotorfault.base.files import made_folder
     from rotorfault.flight.fly import prepare
     from rotorfault.flight.fly import repeat as fly_again
     from rotorfault.scenario.overrides import parse_overrides
@@ -63,10 +63,10 @@ def fly(
     if repeat is not None:
         if any(value is not None for value in (scenario, controller, preset, assignments, seed)):
             raise InputError("--repeat takes scenario, controller and settings from the file; give it alone")
-        folder = output_folder(out or Path("results") / "repeat")
-        with watched as follow:
-            again = fly_again(repeat, engine, allow_code=allow_code, follow=follow)
-        finish(again, folder, figures, view)
+        with made_folder(out or Path("results") / "repeat") as folder:
+            with watched as follow:
+                again = fly_again(repeat, engine, allow_code=allow_code, follow=follow)
+            finish(again, folder, figures, view)
         return
     if scenario is None:
         raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
@@ -75,11 +75,10 @@ def fly(
         settings = {"controller.preset": preset, **settings}
     checked = prepare(scenario, controller, settings, seed, allow_code)
     # A scenario's name is anybody's text: what could lead out of the folder is none of a file's name.
-    folder = out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")
-    output_folder(folder)
-    with watched as follow:
-        flight = _flown(checked, engine, follow)
-    finish(flight, folder, figures, view)
+    with made_folder(out or Path("results") / file_name(f"{checked.name}-{_name(checked)}")) as folder:
+        with watched as follow:
+            flight = _flown(checked, engine, follow)
+        finish(flight, folder, figures, view)
 
 
 def _watched(live: bool, speed: float | None) -> AbstractContextManager[Follow | None]:
@@ -130,19 +129,18 @@ def compare(
     """
     from rich.console import Console
 
-    from rotorfault.base.files import output_folder
+    from rotorfault.base.files import made_folder
     from rotorfault.flight.comparison import compare as flights_side_by_side
 
     if len(flights) < 2:
         raise InputError(f"got {len(flights)} flight file; compare needs at least two")
     folder = out or Path("results") / "compare"
-    if figures:
-        output_folder(folder)
-    compared = flights_side_by_side(flights)
-    Console().print(compared)
-    if figures:
-        written = compared.save_plots(folder)
-        say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
+    with made_folder(folder) if figures else nullcontext():
+        compared = flights_side_by_side(flights)
+        Console().print(compared)
+        if figures:
+            written = compared.save_plots(folder)
+            say(f"\nwrote {', '.join(path.name for path in written)} to {folder}")
 
 
 @app.command()

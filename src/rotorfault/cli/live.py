@@ -6,6 +6,7 @@ one for whatever happens.
 
 from __future__ import annotations
 
+import contextlib
 import time as system_time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +22,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.cli.app import say
 from rotorfault.cli.cockpit import ASCII, PRETTY, Flown, Instant, lines, one_liner
 from rotorfault.maths.arrays import Array
+from rotorfault.results.derived import believed_stuck_at, stuck_at, stuck_text
 from rotorfault.results.flight_data import FlightData
 
 RATE = 12.0  # views a second
@@ -148,6 +150,7 @@ class View:
         self._quiet: dict[int, float] = {}  # until when nothing more is said of the loss of a rotor, s
         self._flown = Flown("", 0.0, 1.0, speed)
         self._last: FlightData | None = None
+        self._closed = False
 
     def __enter__(self) -> View:
         return self
@@ -155,12 +158,21 @@ class View:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
     ) -> None:
-        if kind is None and self._last is not None:
-            self._show(self._last, len(self._last["time"].values) - 1)
-        self._screen.close()
+        with contextlib.suppress(BrokenPipeError):
+            if kind is None and self._last is not None and not self._closed:
+                self._show(self._last, len(self._last["time"].values) - 1)
+            self._screen.close()
 
     def __call__(self, data: FlightData) -> None:
-        """Show some records, and come back when the last of them has been seen."""
+        """Show some records, and come back when the last of them has been seen; at once where nobody looks."""
+        if self._closed:
+            return
+        try:
+            self._follow(data)
+        except BrokenPipeError:
+            self._closed = True  # as of `| head`: the flight flies on
+
+    def _follow(self, data: FlightData) -> None:
         time, about = np.asarray(data["time"].values), data.attrs
         self._flown = Flown(str(about["title"]), float(about["duration"]), float(about["thrust_max"]), self._speed)
         self._coming.extend(self._happened(data))
@@ -189,7 +201,8 @@ class View:
     def _happened(self, data: FlightData) -> Iterator[tuple[float, str]]:
         """Faults, alarms and stages of a landing in some records, in words."""
         time = np.asarray(data["time"].values)
-        loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
+        held = stuck_at(data)
+        loss = np.where(np.isfinite(held), 2.0, np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float)))
         flag = np.asarray(data["fault_flag"].values) > 0.5
         stage = np.asarray(data["landing_stage"].values if "landing_stage" in data else np.zeros(len(time)))
         table = np.hstack([loss, flag, stage[:, None]])
@@ -200,10 +213,12 @@ class View:
             when, k = float(time[at]), int(column)
             rotor = k % rotors
             if k < rotors:
-                if when < self._quiet.get(rotor, 0.0):  # that of a stuck rotor is never at rest
+                if when < self._quiet.get(rotor, 0.0):  # a loss may come as a ramp
                     continue
                 self._quiet[rotor] = when + LINE
                 words = f"rotor {rotor + 1}: true loss now {100.0 * loss[at, rotor]:.3g} %"
+                if np.isfinite(held[at, rotor]):
+                    words = f"rotor {rotor + 1} is {stuck_text(held[at, rotor])}"
             elif k < 2 * rotors:
                 wrong = "false alarm: " if flag[at, rotor] and loss[at, rotor] <= 0.0 else ""
                 words = f"{wrong}rotor {rotor + 1} {'flagged' if flag[at, rotor] else 'cleared'}"
@@ -228,4 +243,6 @@ def _instant(data: FlightData, at: int) -> Instant:
         loss=value("loss_true"),
         believed=value("loss_believed"),
         flagged=value("fault_flag"),
+        stuck=stuck_at(data)[at],
+        stuck_believed=believed_stuck_at(data)[at],
     )

@@ -12,10 +12,11 @@ from typing import Any
 from rotorfault.base import interrupts
 from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
-from rotorfault.cli import campaign, convert, export, fly, look, studies, tune
+from rotorfault.cli import campaign, convert, export, fly, frames, look, studies, tune
 from rotorfault.cli.app import STOPPED, app, say
+from rotorfault.cli.usage import USAGE, refusal
 
-__all__ = ["app", "campaign", "convert", "export", "fly", "look", "main", "studies", "tune"]
+__all__ = ["app", "campaign", "convert", "export", "fly", "frames", "look", "main", "studies", "tune"]
 
 NARROWEST = 20  # columns of a terminal: below, tables have no room for a word
 # What the system says where there is no memory left for a thread or a library.
@@ -36,7 +37,12 @@ def main() -> None:
 
 def _run() -> int:
     try:
-        app(standalone_mode=True)
+        return int(app(args=sys.argv[1:], standalone_mode=False) or 0)
+    except USAGE as error:
+        if len(sys.argv) < 2:  # nothing was asked for: what there is to ask for
+            say(str(error), err=True)
+            return 2
+        return _refuse(refusal(error, sys.argv[1:]))
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except InputError as error:
@@ -55,7 +61,6 @@ def _run() -> int:
         if isinstance(error, MemoryError) or _lacks_memory(error):
             return _refuse("there is not enough memory for this; end other programs, or fly less at once")
         raise
-    return 0
 
 
 def _refuse(message: str) -> int:

@@ -136,9 +136,10 @@ def bench(
     from rotorfault.bench import study
 
     found = study.run(with_peers, quick, lambda line: say(f"measuring: {line}", err=True))
+    if as_json is not None:
+        study.save(found, as_json)  # before a word: a pipe may be closed
     say(study.text(found))
     if as_json is not None:
-        study.save(found, as_json)
         say(f"\nwrote {as_json}")
     if figure is not None:
         study.draw(found, figure)

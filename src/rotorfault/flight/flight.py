@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
+from rotorfault.base import interrupts
 from rotorfault.base.bounds import require
 from rotorfault.base.files import alone_in, output_folder, write_atomically
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.results import exporters
+from rotorfault.results.derived import stuck_rotors
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.netcdf import write_netcdf
 from rotorfault.results.outcome import Outcome, finite_or_none
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorfault.pages.flight_page import Shown
+    from rotorfault.report.film import Film
 
 
 class Summary(dict[str, Any]):
@@ -112,7 +115,9 @@ class Flight:
         attributes = self._data.attrs
         names = ("scenario", "controller", "preset", "plant", "engine")
         about = {name: str(attributes.get(name, "")) for name in names}
-        numbers = finite_or_none(nested(self.scores))
+        numbers = nested(self.scores)
+        numbers["stuck"] = stuck_rotors(self.records()) if numbers["detections"] else []
+        numbers = finite_or_none(numbers)
         return Summary(**about, seed=int(attributes["seed"]), version=str(attributes["version"]), **numbers)
 
     def plot(self) -> dict[str, Figure]:
@@ -172,9 +177,9 @@ class Flight:
         fps : float
             Pictures a second: up to 50 in a GIF, up to 120 in a video.
         width : int
-            Of a picture in pixels, 320 to 3840; its height is 9/16 of it.
+            Of a picture in pixels, even, 320 to 3840; its height is 9/16 of it.
         start, until : float, optional
-            Times of the flight in s; all of it if not given.
+            Times of the flight in s, within it; all of it if not given.
 
         Returns
         -------
@@ -188,11 +193,22 @@ class Flight:
         MissingExtraError
             If a video is wanted and imageio-ffmpeg is not installed.
         """
-        from rotorfault.report.film import Film, write_film
+        from rotorfault.report.film import Film
 
-        name = f"{self.scenario_name} · {self.label}"
-        write_film(self.records(), name, Path(path), Film(speed, fps, width, start, until))
-        return Path(path)
+        return self.film(Path(path), Film(speed, fps, width, start, until))
+
+    def film(self, path: Path, film: Film) -> Path:
+        """Write the flight as a film, as `animate` does.
+
+        Parameters
+        ----------
+        path : Path
+        film : Film
+        """
+        from rotorfault.report.film import write_film
+
+        write_film(self.records(), f"{self.scenario_name} · {self.label}", path, film)
+        return path
 
     def to_csv(self, path: str | Path, every: int = 1, units: bool = True) -> Path:
         """Write all signals as one table, a row per record and a column per component.
@@ -259,8 +275,24 @@ class Flight:
         self.source = str(path)
         return path
 
-    def write(self, folder: str | Path, with_figures: bool = True, with_page: bool = False) -> list[Path]:
+    def write(
+        self,
+        folder: str | Path,
+        with_figures: bool = True,
+        with_page: bool = False,
+        kept: Callable[[], object] = lambda: None,
+    ) -> list[Path]:
         """Write ``flight.nc``, ``summary.json``, the figures and the page ``flight.html`` into a folder.
+
+        The first two come first, and no Ctrl-C comes between; each file is there whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+        with_figures, with_page : bool
+            Whether there are figures, and the page.
+        kept : callable
+            Is called once ``flight.nc`` and ``summary.json`` are there.
 
         Raises
         ------
@@ -271,8 +303,10 @@ class Flight:
         text = json.dumps(self.summary(), indent=2, allow_nan=False) + "\n"
         # Another flight into the same folder waits: its files must not mix with these.
         with alone_in(folder):
-            written = [self.save(folder / "flight.nc"), folder / "summary.json"]
-            write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            with interrupts.held_back():
+                written = [self.save(folder / "flight.nc"), folder / "summary.json"]
+                write_atomically(written[1], lambda temporary: temporary.write_text(text, encoding="utf-8"))
+            kept()
             if with_figures:
                 from rotorfault.report import figures
 

@@ -11,7 +11,8 @@ turn about x, whose matrix is D = diag(1, -1, -1) = D^-1. So
 and the way back is the same. Quaternions are Hamilton's, scalar first, body to world, in all of them.
 
 The motors of an X quadrotor are named by where they are. The orders are those of PX4's generic quad X (airframe
-4001), of ArduPilot's FRAME_CLASS 1 with FRAME_TYPE 1, of Betaflight's quad X with props in, and of the Crazyflie.
+4001), of ArduPilot's FRAME_CLASS 1 with FRAME_TYPE 1, of Betaflight's quad X with props in, and of the Crazyflie;
+`frames` has them.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from rotorfault.base.errors import InputError, choices, short, unknown
 from rotorfault.maths.arrays import Array
+from rotorfault.model.frames import load_frame, place_of
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
 
@@ -52,17 +54,13 @@ KINDS = {
 }
 """Kinds of values that depend on frames."""
 
+UNIT = 1e-3  # by which the norm of a quaternion may miss 1: what three digits leave of it
 MOTORS = "motors"
-CORNERS = ("front right", "rear left", "front left", "rear right")
-"""Where the motors of an X quadrotor are, in PX4's order."""
-ORDERS = {
-    "px4": CORNERS,
-    "ardupilot": CORNERS,
-    "betaflight": ("rear right", "front right", "rear left", "front left"),
-    "crazyflie": ("front right", "rear right", "rear left", "front left"),
-}
+_NAMED = {"px4": "px4-4001", "ardupilot": "ardupilot-1-1", "betaflight": "betaflight", "crazyflie": "crazyflie"}
+ORDERS = {who: tuple(motor.place for motor in load_frame(name).motors) for who, name in _NAMED.items()}
 """Where motors 1, 2, 3, 4 are. Propellers at the front right and rear left turn counter-clockwise in all of them."""
-_COUNTER_CLOCKWISE = ("front right", "rear left")
+CORNERS = ORDERS["px4"]
+"""Where the motors of an X quadrotor are, in PX4's order."""
 
 
 class Layout(NamedTuple):
@@ -87,7 +85,7 @@ def layout(of: str | Path | Vehicle) -> Layout:
         If there is no such order or vehicle, or the vehicle has no rotor at each corner.
     """
     if isinstance(of, str) and of in ORDERS:
-        return Layout(ORDERS[of], tuple(corner not in _COUNTER_CLOCKWISE for corner in ORDERS[of]))
+        return Layout(ORDERS[of], tuple(motor.clockwise for motor in load_frame(_NAMED[of]).motors))
     if isinstance(of, (str, Path)):
         try:
             vehicle = load_vehicle(of).vehicle
@@ -102,20 +100,13 @@ def layout(of: str | Path | Vehicle) -> Layout:
         vehicle = of
     else:
         raise InputError(f"order of motors: got {short(of)}; {choices([*ORDERS, 'a vehicle'])}")
-    corners = tuple(_corner(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+    corners = tuple(place_of(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
     if set(corners) != set(CORNERS):
         raise InputError(
             f"{of if isinstance(of, (str, Path)) else 'vehicle'}: its rotors are {', '.join(corners)}; orders of "
             "motors are known for X quadrotors, which have one each front right, rear left, front left and rear right"
         )
     return Layout(corners, tuple(sign > 0.0 for sign in vehicle.rotor_yaw_sign))
-
-
-def _corner(x: float, y: float) -> str:
-    """Where a rotor at x forward, y left of the centre of mass is, in m; on an axis it is at no corner."""
-    along = "front" if x > 1e-6 else "rear" if x < -1e-6 else ""
-    across = "left" if y > 1e-6 else "right" if y < -1e-6 else ""
-    return " ".join(filter(None, (along, across))) or "centre"
 
 
 def convert(kind: str, values: ArrayLike, source: str | Path | Vehicle, target: str | Path | Vehicle) -> Array:
@@ -152,19 +143,46 @@ def convert(kind: str, values: ArrayLike, source: str | Path | Vehicle, target: 
     >>> rf.convert("motors", [10, 20, 30, 40], "px4", "crazyflie-2.1")
     array([10., 20., 40., 30.])
     """
+    names = components(kind)
     if kind == MOTORS:
         before, after = layout(source), layout(target)
-        numbers = _numbers(kind, values, ("1", "2", "3", "4"))
-        return numbers[..., [before.corners.index(corner) for corner in after.corners]]
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(unknown("kind of value", kind, [*KINDS, MOTORS]))
+        return _numbers(kind, values, names)[..., [before.corners.index(corner) for corner in after.corners]]
     for frame in (source, target):
         if not isinstance(frame, str) or frame not in FRAMES:
             hint = "; its frames are 'ned'" if frame in ("px4", "ardupilot") else ""
             raise InputError(unknown("frame", frame, list(FRAMES)) + hint)
-    numbers = _numbers(kind, values, KINDS[kind].names)
+    numbers = _numbers(kind, values, names)
+    if kind == "quaternion":
+        _require_turns(numbers)
     # Adding 0 makes 0 of -0, which nobody wants to read.
     return numbers.copy() if source == target else numbers * np.array(KINDS[kind].signs) + 0.0
+
+
+def components(kind: str) -> tuple[str, ...]:
+    """Names of the components of a kind of value; of motors, their numbers.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind.
+    """
+    if kind == MOTORS:
+        return ("1", "2", "3", "4")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(unknown("kind of value", kind, [*KINDS, MOTORS]))
+    return KINDS[kind].names
+
+
+def _require_turns(quaternions: Array) -> None:
+    """Refuse quaternions that are no attitude: those that are not of norm 1, as far as they are written."""
+    norms = np.linalg.norm(quaternions, axis=-1).ravel()
+    wrong = norms[~(np.abs(norms - 1.0) <= UNIT)]
+    if len(wrong):
+        raise InputError(
+            f"quaternion: its norm is {wrong[0]:.6g}; allowed: 1, up to {UNIT:g}; divide its components by the norm"
+            if wrong[0] > 0.0
+            else "quaternion: its norm is 0, so it is no attitude; allowed: a norm of 1, such as (1, 0, 0, 0)"
+        )
 
 
 def _numbers(kind: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
@@ -177,4 +195,8 @@ def _numbers(kind: str, values: ArrayLike, names: tuple[str, ...]) -> Array:
         raise InputError(
             f"{kind}: got {short(values)}; allowed: {len(names)} numbers ({', '.join(names)}), or rows of them"
         )
-    return found.astype(float)
+    numbers = found.astype(float)
+    if not np.isfinite(numbers).all():
+        wrong = numbers[~np.isfinite(numbers)][0]
+        raise InputError(f"{kind}: got {wrong:g} among its values; allowed: finite numbers")
+    return numbers

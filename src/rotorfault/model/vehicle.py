@@ -12,6 +12,7 @@ geometry (rotor 1 front, 2 rear, 3 right, 4 left) this is its equation (4) with 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, final
 
 from rotorfault.base.one_line import record_line
@@ -47,6 +48,30 @@ class Opposite(Static):
 
     def __hash__(self) -> int:
         return hash(self.order)
+
+
+_PAIRINGS = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
+OPPOSITE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
+
+
+def opposite_pairs(places: Sequence[tuple[float, float]], yaw_signs: Sequence[float]) -> Opposite | None:
+    """The opposite pairs of a quadrotor's rotors; None where there are none.
+
+    Parameters
+    ----------
+    places : sequence of (float, float), m
+        Of the rotors, forward and left of the centre of mass.
+    yaw_signs : sequence of float
+        +1 or -1, as `Vehicle.rotor_yaw_sign`.
+    """
+    if len(places) != 4:
+        return None
+    for (one, partner), (two, other) in _PAIRINGS:
+        sums = [a + b for i, j in ((one, partner), (two, other)) for a, b in zip(places[i], places[j], strict=True)]
+        turning = yaw_signs[one] == yaw_signs[partner] == -yaw_signs[two] == -yaw_signs[other]
+        if turning and max(map(abs, sums)) <= OPPOSITE_TOLERANCE:
+            return Opposite((one, partner, two, other))
+    return None
 
 
 class Vehicle(NamedTuple):

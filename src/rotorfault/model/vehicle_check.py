@@ -92,7 +92,7 @@ def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
         line = (
             f"{name}: hover leaves an angular acceleration of {turn:.3g} rad/s^2 ({have}); turning by {ANGLE:g} rad "
             f"within {time:g} s takes {least:g} rad/s^2, so the axis can hardly be controlled; "
-            f"{_remedy(name, spare / min(float(f) for f in hover))}"
+            f"{_remedy(name, spare * vehicle.rotors / (vehicle.mass * vehicle.gravity))}"
         )
         yield name, line
 

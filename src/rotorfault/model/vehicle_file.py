@@ -31,11 +31,8 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.one_line import cut
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle
+from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle, opposite_pairs
 
-Pairs = tuple[tuple[int, int], tuple[int, int]]
-_PAIRINGS: tuple[Pairs, ...] = (((0, 1), (2, 3)), ((0, 2), (1, 3)), ((0, 3), (1, 2)))
-BALANCE_TOLERANCE = 1e-6  # m: how far a pair of rotors may be from opposite
 LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
 
 
@@ -253,15 +250,8 @@ class VehicleFile(Strict):
     @property
     def pairs(self) -> Opposite | None:
         """The pairs of a quadrotor whose rotors are opposite in pairs that turn alike; None for any other frame."""
-        if len(self.rotor) != 4:
-            return None
-        for (one, partner), others in _PAIRINGS:
-            pairs = [(self.rotor[a], self.rotor[b]) for a, b in ((one, partner), others)]
-            off = [abs(p + q) for a, b in pairs for p, q in ((a.x.value, b.x.value), (a.y.value, b.y.value))]
-            alike = all(a.yaw == b.yaw for a, b in pairs) and pairs[0][0].yaw != pairs[1][0].yaw
-            if alike and max(off) <= BALANCE_TOLERANCE:
-                return Opposite((one, partner, *others))
-        return None
+        places = [(rotor.x.value, rotor.y.value) for rotor in self.rotor]
+        return opposite_pairs(places, [_sign(rotor) for rotor in self.rotor])
 
     @property
     def thrust_to_weight(self) -> float:

@@ -31,7 +31,7 @@ from rotorfault.results.events import events
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import configuration_of, true_vehicle_file
 
-MOST = 6  # flights on a page: as many as there are colours that colour-blind readers tell apart
+MOST = 6  # flights on a page: as many as have colours that colour-blind readers tell apart
 ROOM = 5_500_000  # characters of data: the page stays below 8 MB with its program
 DENSE = 0.1  # s around events in which no record is left out
 LONGEST = 200  # characters of a name that are shown

@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorfault.autopilot.diagnosis.decision import second_best
 from rotorfault.maths.arrays import ANGLES, AXES, Array
-from rotorfault.maths.geometry import PerRotor
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Vehicle
+from rotorfault.results.derived import believed_stuck_at, believed_thrust, given_wrench, missing_thrust, stuck_at
 from rotorfault.results.flight_data import FlightData, Variable
 
 TRUE, BELIEVED, COMMAND, ASKED, LIMIT, THRESHOLD = "true", "believed", "command", "asked", "limit", "threshold"
@@ -44,6 +43,8 @@ class Panel(NamedTuple):
 def derived(data: FlightData, vehicle: Vehicle | None) -> FlightData:
     """The records with what follows from them: errors, believed thrust, missing thrust, the wrench that was given.
 
+    A rotor that is stuck has no loss, as far as it is: what it gives is a signal of its own.
+
     Parameters
     ----------
     data : FlightData
@@ -62,24 +63,22 @@ def derived(data: FlightData, vehicle: Vehicle | None) -> FlightData:
     if has("position", "position_reference"):
         error = _of(data, "position") - _of(data, "position_reference")
         add("position_error", error, "position", "true position less desired position")
-    if has("expected_thrust", "loss_believed"):
-        believed = _of(data, "expected_thrust") * (1.0 - _of(data, "loss_believed"))
-        add(
-            "thrust_believed", believed, "expected_thrust", "thrust of each rotor as believed, with its believed loss"
-        )
+    if (believed := believed_thrust(data)) is not None:
+        add("thrust_believed", believed, "expected_thrust", "thrust of each rotor as believed")
+    for held, name, loss, whose in (
+        (stuck_at(data), "stuck_true", "loss_true", "is"),
+        (believed_stuck_at(data), "stuck_believed", "loss_believed", "is believed"),
+    ):
+        if has(loss, "thrust") and np.isfinite(held).any():
+            add(name, held, "thrust", f"thrust at which a rotor {whose} stuck")
+            add(loss, np.where(np.isfinite(held), np.nan, _of(data, loss)), loss, f"{loss} of rotors that follow")
     if has("thrust_residual"):
         residual = _of(data, "thrust_residual")
-        sound = np.asarray(second_best(PerRotor.of(residual.T)))
-        add(
-            "thrust_missing",
-            sound[:, None] - residual,
-            "thrust_residual",
-            "thrust that a rotor lacks beside a sound one",
-        )
+        about = "thrust that a rotor lacks beside a sound one"
+        add("thrust_missing", missing_thrust(residual), "thrust_residual", about)
     if vehicle is not None and has("thrust", "thrust_demand", "torque_demand"):
-        given = wrench_of(vehicle, PerRotor.of(_of(data, "thrust").T))
-        add("thrust_given", np.asarray(given.thrust), "thrust_demand", "total thrust that the rotors gave")
-        torque = np.column_stack(list(given.torque_B))
+        thrust, torque = given_wrench(vehicle, _of(data, "thrust"))
+        add("thrust_given", thrust, "thrust_demand", "total thrust that the rotors gave")
         add("torque_given", torque, "torque_demand", "torque that the rotors gave")
     return FlightData({**data.variables, **new}, data.coordinates, data.attrs)
 

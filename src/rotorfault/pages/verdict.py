@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotorfault.analysis.hover import hover_margin
-from rotorfault.loop.scores import RECOVERED, SURVIVED
+from rotorfault.loop.scores import RECOVERED, SURVIVED, YAW_KEPT
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.results.events import faults_of, isolation_time, onsets
+from rotorfault.results.derived import stuck_at
+from rotorfault.results.events import isolation_time, onsets
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import true_vehicle_file
 
-HOLD_THRUST = ("stuck",)  # faults that are no loss: what a rotor can give does not follow from one
 LOOKS = {"settled": "good", "tracked": "good", "landed": "good", "offset": "fair", "interrupted": "fair"}
 
 
@@ -88,6 +88,9 @@ def _consequences(scores: Mapping[str, Any]) -> list[Fact]:
         back, note = scores.get("recovery_time"), f"from the fault until it is back within {RECOVERED:g} m for good"
         if back is None or not math.isfinite(back):
             facts.append(Fact("never", "to recover", note, "bad"))
+        elif scores.get("outcome") == "offset" and (turned := abs(scores.get("yaw_error_end") or 0.0)) > YAW_KEPT:
+            note = f"in place it is back after {back:.3g} s, but at the end its yaw is {turned:.3g} rad off"
+            facts.append(Fact("yaw off", "to recover", note, "fair"))
         else:
             text = f"never beyond {RECOVERED:g} m" if back == 0.0 else f"{back:.3g} s"
             facts.append(Fact("0 s" if back == 0.0 else text, "to recover", text if back == 0.0 else note, "good"))
@@ -103,7 +106,7 @@ def _margin(data: FlightData) -> Fact | None:
     file = true_vehicle_file(data)
     if file is None or "loss_true" not in data or len(data["time"].values) == 0:
         return None
-    if any(fault.get("kind") in HOLD_THRUST for rotor in _rotors(data) for fault in faults_of(data, rotor)):
+    if np.isfinite(stuck_at(data)).any():  # what such a rotor can give does not follow from a loss
         return None
     vehicle = file.vehicle
     loss = np.nan_to_num(np.asarray(data["loss_true"].values, dtype=float))
@@ -123,10 +126,6 @@ def _margin(data: FlightData) -> Fact | None:
     if math.isfinite(least_free):
         return Fact(f"{least_free:.2g} m/s²", "least margin, yaw given up", note, "fair")
     return Fact("none", "least margin", "at some time no hover was possible with the true losses", "bad")
-
-
-def _rotors(data: FlightData) -> range:
-    return range(1, data["loss_true"].values.shape[1] + 1)
 
 
 def _milliseconds(seconds: float) -> str:

@@ -15,6 +15,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
@@ -25,6 +26,7 @@ from rotorfault.report.path_figure import once
 from rotorfault.report.style import BLACK, BLUE, GREY, STYLE, VERMILION, colours_of_loss, shown
 from rotorfault.report.vehicle_view import CAMERA, VehicleView, rotations
 from rotorfault.results.airframe import airframe_of
+from rotorfault.results.derived import believed_stuck_at, stuck_at
 from rotorfault.results.events import events
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.text import FATES
@@ -78,6 +80,8 @@ class Animation:
         self._loss = np.clip(self._values("loss_true"), 0.0, 1.0)
         self._believed, self._flag = self._values("loss_believed"), self._values("fault_flag") > 0.5
         self._colour = colours_of_loss(self._loss) / 255.0
+        self._stuck, self._stuck_believed = stuck_at(data), believed_stuck_at(data)
+        self._colour[np.isfinite(self._stuck)] = to_rgb(GREY)  # no loss, and not sound
         self._events = [event for event in events(data) if event.kind in (*TOLD, "end")]
         with rc_context(STYLE):
             self._figure = Figure(figsize=(INCHES, INCHES * SHAPE), dpi=width / INCHES)
@@ -291,11 +295,15 @@ class Animation:
         self._bars.set_facecolor(self._colour[at])
         self._marks.set_verts(marks)
         for k, (loss, believed) in enumerate(zip(self._losses, self._beliefs, strict=True)):
-            true = float(self._loss[at, k])
-            loss.set(text=f"{100.0 * true:.0f} %", color=BLACK if true > 0.0 else GREY)
+            true, held = float(self._loss[at, k]), float(self._stuck[at, k])
+            faulty = true > 0.0 or held == held
+            loss.set(text=f"stuck at\n{held:.2g} N" if held == held else f"{100.0 * true:.0f} %",
+                     color=BLACK if faulty else GREY)  # fmt: skip
             flagged = bool(self._flag[at, k])
-            wrong = flagged and true <= 0.0
-            text = f"{100.0 * float(self._believed[at, k]):.0f} % !" if flagged else "sound"
+            wrong = flagged and not faulty
+            held = float(self._stuck_believed[at, k])
+            share = f"stuck at\n{held:.2g} N" if held == held else f"{100.0 * float(self._believed[at, k]):.0f} %"
+            text = f"{share} !" if flagged else "sound"
             believed.set(text=text, color=VERMILION if wrong else BLACK if flagged else GREY)
 
     def _say(self, moment: Moment) -> None:

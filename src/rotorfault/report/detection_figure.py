@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from rotorfault.autopilot.diagnosis.decision import SMALL_THRUST, second_best
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.autopilot.diagnosis.decision import SMALL_THRUST
 from rotorfault.report.drawn import Drawn, around_onsets, whole
 from rotorfault.report.marks import REFERENCE, keep_ends_inside, legend, sample
 from rotorfault.report.panels import Column, Curve, Panel, core_of, dashed, grid, note_cut, solid, spans
 from rotorfault.report.style import BLACK, GREY, ORANGE, new_figure, padded, span
+from rotorfault.results.derived import missing_thrust, stuck_at, stuck_text
 
 THRESHOLD: dict[str, Any] = {"linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.8, "zorder": 1.9}
 IN_FORCE = "thrust_threshold"  # N, of diagnoses that record one
@@ -46,7 +46,9 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure | None:
     for k, rotor in enumerate(rotors):
         limit = Curve("loss_threshold", k, threshold)
         curves = (solid("loss_estimated", k), dashed("loss_true", k), limit)
-        loss_panels.append(Panel(f"rotor {rotor}", curves, reach=np.inf))
+        held = {float(stuck_at(flight.data)[-1, k]) for flight in drawn}
+        words = f"{stuck_text(*held)}\n" if len(held) == 1 and np.isfinite([*held]).all() else ""
+        loss_panels.append(Panel(f"{words}rotor {rotor}", curves, reach=np.inf))
         limits = [Curve(IN_FORCE, k, threshold), Curve("threshold_below", k, threshold)]
         missing = (solid("thrust_missing", k), *limits[: 1 + too_much])
         missing_panels.append(Panel(f"rotor {rotor}", missing, reach=np.inf))
@@ -81,9 +83,10 @@ def detection_figure(drawn: Sequence[Drawn]) -> Figure | None:
 
 def _with_missing(flight: Drawn) -> Drawn:
     """With the thrust that each rotor lacks beside a sound one, and the threshold in force as a loss."""
-    residual = flight.values("thrust_residual")
-    sound = np.asarray(second_best(PerRotor.of(residual.T)))
-    flight = flight.adding({"thrust_missing": sound[:, None] - residual}, "thrust_residual")
+    flight = flight.adding({"thrust_missing": missing_thrust(flight.values("thrust_residual"))}, "thrust_residual")
+    # A rotor that is stuck has no loss: that it falls short of its command by some share says nothing of it.
+    loss = np.where(np.isfinite(stuck_at(flight.data)), np.nan, flight.values("loss_true"))
+    flight = flight.adding({"loss_true": loss}, "loss_true")
     recorded = flight.data.get("diagnosis.threshold")
     if recorded is None or recorded.dims != ("time", "rotor"):
         return flight

@@ -7,15 +7,16 @@ second, so the pictures of one have unequal durations that add up.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from rotorfault.base.errors import InputError, choices, missing_extra
+from rotorfault.base.errors import InputError, choices, missing_extra, short
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.base.progress import Bar
 from rotorfault.report.animation import Animation
@@ -27,6 +28,7 @@ HOLD = 1.0  # s for which the last picture stays
 GIF_FASTEST, FASTEST = 50.0, 120.0  # pictures a second; browsers show a GIF that is faster more slowly
 SPEEDS = 0.001, 1000.0
 MOST_PICTURES = 100_000
+LATE = 1e-3  # s by which the end may be missed that is asked for, as it is told in few digits
 
 
 class Film(NamedTuple):
@@ -37,6 +39,11 @@ class Film(NamedTuple):
     width: int = 960  # pixels
     start: float | None = None  # s of the flight; its beginning if not given
     until: float | None = None  # s of the flight; its end if not given
+    names: Mapping[str, str] = {}  # what the above are called where they were given, if otherwise
+
+    def called(self, name: str) -> str:
+        """What a field is called where it was given."""
+        return self.names.get(name, name)
 
     def checked(self, gif: bool) -> Film:
         """The same, if it can be made.
@@ -47,21 +54,29 @@ class Film(NamedTuple):
             If a value is not allowed.
         """
         fastest = GIF_FASTEST if gif else FASTEST
-        _require("speed", self.speed, *SPEEDS, "times real time")
-        _require("fps", self.fps, 1.0, fastest, "pictures a second" + (" in a GIF" if gif else ""))
-        _require("width", self.width, NARROWEST, WIDEST, "pixels")
-        for name, value in (("from", self.start), ("until", self.until)):
-            if value is not None:
-                _require(name, value, 0.0, 1e9, "s")
-        return self
+        self._require("speed", Real, *SPEEDS, "times real time")
+        self._require("fps", Real, 1.0, fastest, "pictures a second" + (" in a GIF" if gif else ""))
+        self._require("width", Integral, NARROWEST, WIDEST, "pixels")
+        for name in ("start", "until"):
+            if getattr(self, name) is not None:
+                self._require(name, Real, 0.0, 1e9, "s")
+        if self.start is not None and self.until is not None and self.until <= self.start:
+            raise InputError(
+                f"{self.called('until')}: got {self.until:g}; allowed: a time after {self.called('start')}, "
+                f"{self.start:g} s"
+            )
+        return self._replace(width=int(self.width))
 
-
-def _require(name: str, value: Any, low: float, high: float, unit: str) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    whole = name != "width" or isinstance(value, int)
-    if not (number and whole and low <= value <= high):
-        kind = "a whole number" if name == "width" else "a number"
-        raise InputError(f"{name}: got {value!r}; allowed: {kind} from {low:g} to {high:g} {unit}")
+    def _require(self, name: str, kind: type, low: float, high: float, unit: str) -> None:
+        value = getattr(self, name)
+        number = isinstance(value, kind) and not isinstance(value, bool)
+        right = number and low <= float(getattr(self, name)) <= high
+        # An odd number of pixels is no size of a video.
+        if not right or (kind is Integral and int(getattr(self, name)) % 2):
+            words = "an even whole number" if kind is Integral else "a number"
+            raise InputError(
+                f"{self.called(name)}: got {short(value)}; allowed: {words} from {low:g} to {high:g} {unit}"
+            )
 
 
 def write_film(data: FlightData, label: str, path: Path, film: Film) -> None:
@@ -84,12 +99,9 @@ def write_film(data: FlightData, label: str, path: Path, film: Film) -> None:
     MissingExtraError
         If a video is wanted and the library for it is not installed.
     """
-    ending = path.suffix.lower()
-    if ending not in WRITERS:
-        raise InputError(f"{path}: its ending tells no kind of film ({choices(WRITERS)})")
-    film = film.checked(ending == ".gif")
-    times = moments(data, film)
-    animation = Animation(data, label, film.width - film.width % 2, film.speed)
+    film = film.checked(require_kind(path))
+    times, ending = moments(data, film), path.suffix.lower()
+    animation = Animation(data, label, film.width, film.speed)
     with Bar("drawing", len(times), "pictures") as bar:
 
         def pictures() -> Iterator[NDArray[np.uint8]]:
@@ -102,6 +114,19 @@ def write_film(data: FlightData, label: str, path: Path, film: Film) -> None:
                 bar.update(number + 1)
 
         write_atomically(in_folder(path), lambda temporary: WRITERS[ending](temporary, pictures(), film.fps))
+
+
+def require_kind(path: Path) -> bool:
+    """Whether a film is a GIF, by the ending of its file.
+
+    Raises
+    ------
+    InputError
+        If the ending tells no kind of film.
+    """
+    if path.suffix.lower() not in WRITERS:
+        raise InputError(f"{path}: its ending tells no kind of film ({choices(WRITERS)})")
+    return path.suffix.lower() == ".gif"
 
 
 def moments(data: FlightData, film: Film) -> list[float]:
@@ -122,17 +147,19 @@ def moments(data: FlightData, film: Film) -> list[float]:
         raise InputError("the flight has no records; there is nothing to animate")
     last = max(float(records[-1]), float(data.attrs.get("end_time", records[-1])))
     start = float(records[0]) if film.start is None else film.start
-    until = last if film.until is None else min(film.until, last)
-    if start > last or until < start:
-        raise InputError(
-            f"from {start:g} s until {until if film.until is None else film.until:g} s there is no flight; it lasts "
-            f"from {records[0]:g} to {last:g} s"
-        )
+    until = last if film.until is None else film.until
+    for name, value in (("start", film.start), ("until", film.until)):
+        latest = last + LATE if name == "until" else last
+        if value is not None and not records[0] <= value <= latest:
+            raise InputError(
+                f"{film.called(name)}: got {value:g}; allowed: a time of the flight, {records[0]:g} to {last:g} s"
+            )
+    until = min(until, last)
     count = math.floor((until - start) / film.speed * film.fps + 1e-6) + 1
     if count > MOST_PICTURES:
         raise InputError(
             f"the film would have {count:,} pictures; allowed: {MOST_PICTURES:,}; take less of the flight with "
-            "--from and --until, or a greater --speed"
+            f"{film.called('start')} and {film.called('until')}, or a greater {film.called('speed')}"
         )
     times = [start + number * film.speed / film.fps for number in range(count)]
     return [*times, *[until] * round(HOLD * film.fps)]

@@ -13,6 +13,7 @@ from rotorfault.report.drawn import Drawn, around_onsets
 from rotorfault.report.marks import legend, sample
 from rotorfault.report.panels import Curve, Panel, grid, one_scale, solid, whole_and_detail
 from rotorfault.report.style import BLACK, GREY, ORANGE, new_figure
+from rotorfault.results.derived import STUCK_BELIEVED, believed_stuck_at
 
 LIMIT: dict[str, Any] = {"color": BLACK, "linestyle": (0, (6.0, 1.5, 1.0, 1.5)), "linewidth": 0.7}
 # Commands are as noisy as what they are made of, so they lie below, and dashes would not be seen.
@@ -33,7 +34,7 @@ def rotor_figure(drawn: Sequence[Drawn]) -> Figure:
     The autopilot believes it to give at most its greatest thrust less the believed loss.
     """
     drawn = [_with_possible(flight) for flight in drawn]
-    believing = any(flight.moves("loss_believed") for flight in drawn)
+    believing = any(flight.moves(name) for flight in drawn for name in ("loss_believed", STUCK_BELIEVED))
     alone = len(drawn) == 1
     rotors = [int(rotor) for rotor in drawn[0].data["rotor"].values]
     # Of several flights, each has its own colour for this too.
@@ -65,10 +66,11 @@ def rotor_figure(drawn: Sequence[Drawn]) -> Figure:
 
 
 def _with_possible(flight: Drawn) -> Drawn:
-    """With the greatest thrust that the autopilot believes of each rotor."""
+    """With the greatest thrust that the autopilot believes of each rotor; of one believed stuck, what it gives."""
     vehicle = flight.vehicle
     greatest = (1.0 if vehicle is None else vehicle.rotor_gain) * float(flight.data.attrs.get("thrust_max", np.nan))
-    return flight.adding({"thrust_possible": (1.0 - flight.values("loss_believed")) * greatest}, "thrust")
+    held, followed = believed_stuck_at(flight.data), (1.0 - flight.values("loss_believed")) * greatest
+    return flight.adding({"thrust_possible": np.where(np.isfinite(held), held, followed)}, "thrust")
 
 
 def _limits(drawn: Sequence[Drawn]) -> list[float]:

@@ -9,12 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rotorfault.maths.arrays import ANGLES
-from rotorfault.maths.geometry import PerRotor
-from rotorfault.model.vehicle import wrench_of
 from rotorfault.report.drawn import Drawn, whole
 from rotorfault.report.marks import legend, sample
 from rotorfault.report.panels import Curve, Panel, Strip, core_of, solid, timeline
 from rotorfault.report.style import ORANGE, new_figure, span
+from rotorfault.results.derived import given_wrench
 
 # Demands are as noisy as what they are made of, so they lie below, and dashes would not be seen.
 DEMAND: dict[str, Any] = {"linestyle": "-", "linewidth": 1.8, "zorder": 1.8}
@@ -67,7 +66,6 @@ def _with_given(flight: Drawn) -> Drawn:
         flight = flight.adding({f"{name}_allocated": allocated, f"{name}_given": allocated}, f"{name}_demand")
     if (vehicle := flight.vehicle) is None:
         return flight
-    given = wrench_of(vehicle, PerRotor.of(flight.values("thrust").T))
-    torque = np.column_stack(list(given.torque_B))
-    flight = flight.adding({"thrust_given": np.asarray(given.thrust)}, "thrust_demand")
+    thrust, torque = given_wrench(vehicle, flight.values("thrust"))
+    flight = flight.adding({"thrust_given": thrust}, "thrust_demand")
     return flight.adding({"torque_given": torque}, "torque_demand")

@@ -15,21 +15,22 @@ from numpy.typing import NDArray
 from rotorfault.base.one_line import cut
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.model.frames import load_frame
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import vehicle_file_of
 
 DISC = 0.27  # radius of a disc over the least distance of two rotors; vehicle files do not say it
 
-# PX4's orders of motors, of its generic airframes: azimuth of motors 1, 2, ... in degrees, clockwise from the front.
-# https://docs.px4.io/main/en/airframes/airframe_reference.html
-PX4_ORDERS = {
-    "quadrotor x": (45.0, 225.0, 315.0, 135.0),
-    "quadrotor +": (90.0, 270.0, 0.0, 180.0),
-    "hexarotor x": (90.0, 270.0, 330.0, 150.0, 30.0, 210.0),
-    "hexarotor +": (0.0, 180.0, 240.0, 60.0, 300.0, 120.0),
-    "octorotor x": (22.5, 202.5, 67.5, 157.5, 337.5, 247.5, 292.5, 112.5),
-    "octorotor +": (0.0, 180.0, 45.0, 135.0, 315.0, 225.0, 270.0, 90.0),
+_PX4_FRAMES = {
+    "quadrotor x": "px4-4001",
+    "quadrotor +": "px4-5001",
+    "hexarotor x": "px4-6001",
+    "hexarotor +": "px4-7001",
+    "octorotor x": "px4-8001",
+    "octorotor +": "px4-9001",
 }
+# PX4's orders of motors, of its generic airframes: azimuth of motors 1, 2, ... in degrees, clockwise from the front.
+PX4_ORDERS = {name: tuple(motor.azimuth for motor in load_frame(frame).motors) for name, frame in _PX4_FRAMES.items()}
 
 
 class Airframe(NamedTuple):

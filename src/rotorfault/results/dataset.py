@@ -16,11 +16,13 @@ import xarray as xr
 
 from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError
+from rotorfault.base.files import instead_of_folder
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
 from rotorfault.results.seal import DIGESTS, changed_attributes, changed_variables
 from rotorfault.results.whole import json_table
 
 OLD_FORMAT = "rotorfault-flight-1"
+HDF5 = b"\x89HDF\r\n\x1a\n"  # how a file begins that is or was one
 Content = TypeVar("Content")
 
 
@@ -84,6 +86,8 @@ def _require_unchanged(attributes: Mapping[str, Any], path: str | Path) -> None:
 
 def _from(path: Path, read: Callable[[Path], Content]) -> Content:
     """What is read of any file that xarray reads."""
+    if path.is_dir():
+        raise InputError(f"{path}: {instead_of_folder(path, '.nc')}")
     if not path.is_file():
         raise InputError(f"{path}: no such file; give a flight.nc that 'rotorfault fly' wrote")
     try:
@@ -91,10 +95,17 @@ def _from(path: Path, read: Callable[[Path], Content]) -> Content:
         with h5py.File(path, "r"):
             pass
         return read(path)
-    except Exception as error:
-        # h5py and xarray raise a dozen kinds for files that are truncated or no HDF5 at all.
-        reason = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: cannot be read as a flight ({reason}); fly it again") from None
+    except PermissionError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from None
+    except Exception:
+        # h5py and xarray raise a dozen kinds, in words of their own, for files that are cut or no HDF5 at all.
+        with path.open("rb") as file:
+            begins = file.read(len(HDF5))
+        if HDF5.startswith(begins):
+            raise InputError(
+                f"{path}: is cut or damaged ({path.stat().st_size:,} bytes); restore a copy, or fly it again"
+            ) from None
+        raise InputError(f"{path}: is no flight file; give a flight.nc that 'rotorfault fly' wrote") from None
 
 
 def _dataset(path: Path) -> xr.Dataset:

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.results.derived import STUCK, stuck_at, stuck_text
 from rotorfault.results.flight_data import FlightData
+from rotorfault.results.flown import faults_of
 
 MERGE = 0.05  # s: what stops for less than that has not stopped
 JUMP = 0.02  # of a true loss from one record to the next: a fault that sets in, and no drift
@@ -110,6 +112,7 @@ def _faults(data: FlightData, time: Array, scores: Mapping[str, Any]) -> Iterato
     if "loss_true" not in data:
         return
     losses = np.asarray(data["loss_true"].values, dtype=float)
+    losses = np.where(np.isfinite(stuck_at(data)), 0.0, losses)  # a stuck rotor has no loss
     for k in range(losses.shape[1]):
         onset = first.get(k + 1, np.inf)
         later = [at for at in _steps(losses[:, k]) if time[at] > onset + MERGE]
@@ -119,7 +122,7 @@ def _faults(data: FlightData, time: Array, scores: Mapping[str, Any]) -> Iterato
 
 
 def _steps(loss: Array) -> list[int]:
-    """Records at which a loss goes from one steady value to another; that of a stuck rotor is never steady."""
+    """Records at which a loss goes from one steady value to another."""
     change = np.abs(np.diff(loss))
     found = np.flatnonzero(change > JUMP)
     return [
@@ -129,27 +132,13 @@ def _steps(loss: Array) -> list[int]:
     ]
 
 
-def faults_of(data: FlightData, rotor: int) -> list[dict[str, Any]]:
-    """The faults of a rotor as the scenario has them: the settings of each; none where the records do not tell.
-
-    Parameters
-    ----------
-    data : FlightData
-    rotor : int
-        Its number, from 1.
-    """
-    try:
-        faults = json.loads(data.attrs.get("configuration", "{}")).get("fault", [])
-        return [fault for fault in faults if fault.get("rotor") == rotor]
-    except (ValueError, AttributeError, TypeError):
-        return []
-
-
 def _fault_text(rotor: int, faults: list[dict[str, Any]], loss: float | None) -> str:
     """A plain loss says how much; of other faults the kind and its settings tell more."""
     share = " thrust" if loss is None else f" {100.0 * loss:.3g} % of its thrust"
     if all(fault.get("kind") == "step" for fault in faults):
         return f"rotor {rotor} loses{share}"
+    if len(faults) == 1 and faults[0].get("kind") == STUCK and isinstance(faults[0].get("thrust"), (int, float)):
+        return f"rotor {rotor} is {stuck_text(faults[0]['thrust'])}"
     return f"fault of rotor {rotor} begins: " + "; ".join(map(_settings_text, faults))
 
 

@@ -45,3 +45,18 @@ def true_vehicle_file(data: Records) -> VehicleFile | None:
         return file.with_factors(factors)
     except (ValueError, TypeError):
         return None
+
+
+def faults_of(data: Records, rotor: int) -> list[dict[str, Any]]:
+    """The faults of a rotor as the scenario has them: the settings of each; none where the records do not tell.
+
+    Parameters
+    ----------
+    data : Records
+    rotor : int
+        Its number, from 1.
+    """
+    try:
+        return [fault for fault in configuration_of(data).get("fault", []) if fault.get("rotor") == rotor]
+    except (AttributeError, TypeError):
+        return []

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rotorfault.base.angles import wrapped
 from rotorfault.base.plain_text import one_line
 from rotorfault.loop.scores import YAW_KEPT
+from rotorfault.results.derived import stuck_text
 
 
 def number(value: float | None, unit: str = "", digits: int = 4) -> str:
@@ -34,9 +36,10 @@ def rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     found += _settling_rows(summary)
     shares = _given_up(summary).items()
     given_up = ", ".join(f"{what} {number(100.0 * share, '%', 3)}" for what, share in shares)
+    attitude = {name: None if angle is None else wrapped(angle) for name, angle in summary["attitude_end"].items()}
     found += [
         ("position error at the end", per_axis(summary["position_error_end"], "m")),
-        ("attitude at the end", per_axis(summary["attitude_end"], "rad")),
+        ("attitude at the end", per_axis(attitude, "rad")),
         ("position mean square error", per_axis(summary["position_mse"], "m^2")),
         ("attitude mean square error", per_axis(summary["attitude_mse"], "rad^2")),
         ("cost J", number(summary["cost"], digits=5)),
@@ -66,16 +69,18 @@ def _fault_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     found = [("largest excursion after the fault", number(summary["excursion"], "m", 3))]
     if summary.get("landing") is None:
         back = summary["recovery_time"]
-        found.append(("back within 0.25 m", _back(back)))
+        found.append(("back within 0.25 m", _back(back, _why(summary))))
     found.append(("altitude lost", number(summary["altitude_lost"], "m", 3)))
+    stuck = {one["rotor"]: one for one in summary.get("stuck", [])}
     for hit in summary["detections"]:
-        if hit["detected_time"] is None:
-            text = "not detected"
-        else:
-            text = (
-                f"flagged after {1e3 * hit['delay']:.0f} ms, loss {number(hit['loss_estimated'], digits=3)} "
-                f"(true {hit['loss_true']:.3g})"
-            )
+        seen = hit["detected_time"] is not None
+        text = f"flagged after {1e3 * hit['delay']:.0f} ms, " if seen else "not detected"
+        if (one := stuck.get(hit["rotor"])) is not None:
+            held, believed = one["thrust"], one["thrust_believed"]
+            belief = f"loss {number(hit['loss_estimated'], digits=3)}" if believed is None else stuck_text(believed)
+            text += f"believed {belief} (true: {stuck_text(held)})" if seen else f"; {stuck_text(held)}"
+        elif seen:
+            text += f"loss {number(hit['loss_estimated'], digits=3)} (true {hit['loss_true']:.3g})"
         found.append((f"fault of rotor {hit['rotor']} at {hit['true_time']:g} s", text))
     found.append(("false alarms", str(summary["false_alarms"])))
     if summary.get("landing") is not None:
@@ -89,11 +94,11 @@ def _why(summary: dict[str, Any]) -> str:
     return f", yaw {number(turned, 'rad', 3)} off" if summary["outcome"] == "offset" and turned > YAW_KEPT else ""
 
 
-def _back(after: float | None) -> str:
-    """When a vehicle was back from an excursion."""
+def _back(after: float | None, but: str) -> str:
+    """When a vehicle was back from an excursion, and what is not."""
     if after is None or not math.isfinite(after):
         return "never"
-    return "never left it" if after == 0.0 else f"{number(after, 's')} after the fault"
+    return ("never left it" if after == 0.0 else f"{number(after, 's')} after the fault") + but
 
 
 def _settling_rows(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -53,7 +53,7 @@ def step(
     noise: float = 0.0,
 ) -> tuple[DecisionMemory, Diagnosis]:
     """One instant, with a model error and noise in N."""
-    evidence = Evidence(residual, thrust, Misstated(*[PerRotor.all(error * error)] * 2), noise)
+    evidence = Evidence(residual, thrust, Misstated(*[PerRotor.all(error * error)] * 2), PerRotor.all(noise))
     return decide(memory, evidence, VEHICLE, parameters, dt)[:2]
 
 
@@ -186,7 +186,7 @@ def test_a_rotor_that_falls_behind_its_partner_is_not_excused_by_errors_about_ya
         (PerRotor(-1.0, -1.0, 0.0, 0.0), [0.0] * 4),  # may well be yaw
         (PerRotor(0.0, 1.0, 0.0, 0.0), [0.0] * 4),  # rotor 1 falls behind its partner only because that gives more
     ):
-        evidence = Evidence(residual, PerRotor.all(HOVER), errors, 0.0)
+        evidence = Evidence(residual, PerRotor.all(HOVER), errors, PerRotor.all(0.0))
         told = decide(undecided(), evidence, VEHICLE, numbers(persistence=0.0), T)[1]
         assert list(told.flagged) == expected
 

@@ -8,9 +8,11 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.results.events import events
 from rotorfault.results.exporters import mat, mcap, parquet, rrd, table, ulog
-from rotorfault.results.exporters.table import every_nth
+from rotorfault.results.exporters.table import every_nth, whole_every
 from rotorfault.results.exporters.wanted import Wanted, Writer
 from rotorfault.results.flight_data import FlightData
+
+__all__ = ["ENDINGS", "FORMATS", "form_of", "format_of", "target_of", "whole_every", "write", "writer_of"]
 
 FORMATS: dict[str, Writer] = {
     "csv": table.write_csv,
@@ -47,15 +49,38 @@ def write(data: FlightData, path: Path, form: str | None = None, every: int = 1,
     Raises
     ------
     InputError
-        If there is no such format, `every` is no whole number from 1 on, the flight does not fit the format, the
-        folder does not exist, or a library is missing.
+        If there is no such format or the path ends in that of another, `every` is no whole number from 1 on, the
+        flight does not fit the format, the folder does not exist, or a library is missing.
     """
-    writer = writer_of(form or form_of(path))
+    writer = writer_of(format_of(path, form))
     some = every_nth(data, every)
     companions: list[Path] = []
     wanted = Wanted(units, path, companions, events(data))
     write_atomically(in_folder(path), lambda temporary: writer(some, temporary, wanted))
     return [path, *companions]
+
+
+def format_of(path: Path, form: str | None) -> str:
+    """The format of a file, if what was asked for and its ending do not say two things.
+
+    Parameters
+    ----------
+    path : Path
+    form : str, optional
+        One of `FORMATS`; by the ending of the path if not given.
+
+    Raises
+    ------
+    InputError
+        If there is no such format, or the path ends in that of another.
+    """
+    if form is None:
+        return form_of(path)
+    writer_of(form)
+    others = {ending for other, ending in ENDINGS.items() if other != form}
+    if path.suffix.lower() in others:
+        raise InputError(f"{path}: ends in {path.suffix}, and {form} was asked for; allowed: {ENDINGS[form]}")
+    return form
 
 
 def form_of(path: Path) -> str:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rotorfault.base.errors import missing_extra
+from rotorfault.base.errors import FileWarning, missing_extra
 from rotorfault.base.files import write_atomically
 from rotorfault.base.progress import Bar
 from rotorfault.maths.arrays import Array
@@ -87,6 +88,10 @@ def write(data: FlightData, path: Path, wanted: Wanted) -> None:
         writer.finish()  # type: ignore[no-untyped-call]
     beside = wanted.path.with_name(f"{wanted.path.stem}.foxglove.json")
     text = json.dumps(layout(_fields(data)), indent=1)
+    if beside.exists() and (not beside.is_file() or beside.read_bytes() != text.encode()):
+        kept = f"{beside}: was there already and is kept; move it away and export again for the layout of this flight"
+        warnings.warn(kept, FileWarning, stacklevel=2)
+        return
     write_atomically(beside, lambda temporary: temporary.write_text(text, encoding="utf-8"))
     wanted.companions.append(beside)
 

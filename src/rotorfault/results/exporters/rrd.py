@@ -15,6 +15,7 @@ import numpy as np
 from rotorfault.base.errors import missing_extra
 from rotorfault.base.plain_text import one_line
 from rotorfault.model.vehicle_file import VehicleFile
+from rotorfault.results.derived import believed_thrust
 from rotorfault.results.exporters.wanted import Names, Wanted, signals, texts
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import vehicle_file_of
@@ -119,9 +120,7 @@ def _thrusts(rr: Any, stream: Any, data: FlightData, time: Any, file: VehicleFil
     """Arrows of true thrust, and of the one that is believed, at each rotor."""
     places = np.array([(rotor.x.value, rotor.y.value, 0.0) for rotor in file.rotor])
     reach, most = float(np.hypot(*places.T[:2]).max()), file.thrust_max.value
-    believed = None
-    if "expected_thrust" in data and "loss_believed" in data:
-        believed = np.asarray(data["expected_thrust"].values) * (1.0 - np.asarray(data["loss_believed"].values))
+    believed = believed_thrust(data)
     true = np.asarray(data["thrust"].values) if "thrust" in data else None
     for name, thrust, colour in (("thrust", true, BLUE), ("thrust_believed", believed, ORANGE)):
         if thrust is None or thrust.shape[1] != len(places):

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
+from typing import SupportsIndex
 
 import numpy as np
 
 from rotorfault.base.csv_text import write_columns
-from rotorfault.base.errors import InputError
+from rotorfault.base.errors import InputError, short
 from rotorfault.base.progress import Bar
 from rotorfault.maths.arrays import Array
 from rotorfault.results.exporters.wanted import Wanted
 from rotorfault.results.flight_data import FlightData
 
 
-def every_nth(data: FlightData, every: int) -> FlightData:
+def whole_every(every: SupportsIndex, name: str = "every") -> int:
+    """Of how many records one is written.
+
+    Parameters
+    ----------
+    every : int
+        Of Python or NumPy.
+    name : str
+        What it is called where it was given.
+
+    Raises
+    ------
+    InputError
+        If it is no whole number from 1 on.
+    """
+    try:
+        found = 0 if isinstance(every, bool) else operator.index(every)
+    except TypeError:
+        found = 0
+    if found < 1:
+        raise InputError(f"{name}: got {short(every)}; allowed: a whole number of records, 1 or more")
+    return found
+
+
+def every_nth(data: FlightData, every: SupportsIndex) -> FlightData:
     """One of so many records, from the first on, on the same memory.
 
     Parameters
@@ -27,9 +53,8 @@ def every_nth(data: FlightData, every: int) -> FlightData:
     InputError
         If `every` is no whole number from 1 on.
     """
-    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
-        raise InputError(f"every: got {every!r}; allowed: a whole number of records, 1 or more")
-    return data if every == 1 else data.isel(time=slice(None, None, every))
+    step = whole_every(every)
+    return data if step == 1 else data.isel(time=slice(None, None, step))
 
 
 def columns_of(data: FlightData, units: bool = True) -> dict[str, Array]:
