@@ -30,8 +30,8 @@ from rotorfault.model.signals import (
 from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
 
 DEMANDS = (
-    "Wrench(thrust, Vec3(roll, pitch, yaw)) in N and N m, or PerRotor(r1, r2, r3, r4) of thrusts in N, which are "
-    "thrust_coefficient times the squared rotor speeds"
+    "Wrench(thrust, Vec3(roll, pitch, yaw)) in N and N m, or PerRotor(r1, r2, ...) of a thrust for each rotor "
+    "in N, which is thrust_coefficient times the squared rotor speed"
 )
 """What a controller may ask for, for messages."""
 

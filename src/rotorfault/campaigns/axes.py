@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rotorfault.base.angles import TURN, in_radians
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.plant.sensors import Noisy
 from rotorfault.scenario.preset_file import is_preset_file
 
@@ -63,11 +64,11 @@ def _noise(values: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 AXES: dict[str, Axis] = {
-    "rotor": Axis("", "rotor of the first fault, 1 to 4", _key("rotor", "fault.0.rotor"), (1, 4)),
+    "rotor": Axis("", "rotor of the first fault, from 1", _key("rotor", "fault.0.rotor"), (1, MOST_ROTORS)),
     "loss": Axis("1", "loss of the first fault", _key("loss", "fault.0.loss"), (0.0, 1.0)),
     "onset": Axis("s", "time of the first fault", _onset, (0.0, np.inf)),
     "ramp": Axis("s", "length of the first fault's ramp (kind ramp), which begins at onset", _ramp, (0.0, np.inf)),
-    "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, 4)),
+    "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, MOST_ROTORS)),
     "second_loss": Axis("1", "loss of the second fault", _key("second_loss", "fault.1.loss"), (0.0, 1.0)),
     "second_onset": Axis("s", "time of the second fault", _key("second_onset", "fault.1.time"), (0.0, np.inf)),
     "wind_speed": Axis("m/s", "speed of the mean wind, over ground", _wind, (0.0, 100.0)),

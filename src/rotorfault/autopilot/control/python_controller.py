@@ -91,20 +91,24 @@ class PythonController(Controller[Clock, Sampling]):
                 f"controller {name}.update at t = {time:g} s: {type(error).__name__}: {' '.join(str(error).split())} "
                 f"({frame.filename}, line {frame.lineno})"
             ) from error
-        return Clock(memory.steps + 1.0), ControlOutput(_checked(demand, name)), Nothing()
+        return Clock(memory.steps + 1.0), ControlOutput(_checked(demand, name, inputs.vehicle.rotors)), Nothing()
 
 
-def _checked(demand: object, name: str) -> Wrench | PerRotor:
-    """A wrench or thrusts, of numbers; nothing else that holds four of them, for nobody knows what they are."""
+def _checked(demand: object, name: str, rotors: int) -> Wrench | PerRotor:
+    """A wrench or thrusts, of numbers; nothing else that holds as many, for nobody knows what they are."""
     try:
         if not isinstance(demand, (Wrench, PerRotor)):
             raise TypeError
-        first, second, third, fourth = (real(x) for x in flatten(demand))
+        numbers = [real(x) for x in flatten(demand)]
     except (TypeError, ValueError, PydanticCustomError):
         raise InputError(f"controller {name}.update returned {short(demand)}; allowed: {DEMANDS}") from None
     if isinstance(demand, PerRotor):
-        return PerRotor(first, second, third, fourth)
-    return Wrench(first, Vec3(second, third, fourth))
+        if len(numbers) != rotors:
+            got = f"controller {name}.update returned thrusts of {len(numbers)} rotors"
+            raise InputError(f"{got}; allowed: of each of the vehicle's {rotors}")
+        return PerRotor(*numbers)
+    thrust, *torque = numbers
+    return Wrench(thrust, Vec3(*torque))
 
 
 class PythonKind:
