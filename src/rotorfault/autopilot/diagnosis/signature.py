@@ -2,14 +2,14 @@ r"""Which rotors explain a missing torque, on frames of any number of rotors.
 
 A body shows four numbers, thrust and three torques, so with more than four rotors their thrusts cannot be told from
 them one by one. Faults are few, though: a rotor that lacks :math:`f_i` leaves the torque :math:`-b_i f_i`, its
-*signature*, b_i the torques of a newton of it. With the variances V of the observed torque :math:`\tau`, by noise and
-by what a wrong model explains,
+*signature*, b_i the torques of a newton of it. With V, squares of what of the observed torque :math:`\tau` may be
+no fault: `noise` standard deviations of noise, and what a wrong model explains,
 
 - rotors that are flagged explain what they can of it together, :math:`f = PB^T(BPB^T + V)^{-1}(-\tau)`, with as much
   thrust as they may lack for prior deviations, :math:`P`;
 - of the others, one explains of the rest :math:`\tau'` by itself :math:`f_i = -b_i^TV^{-1}\tau' / b_i^TV^{-1}b_i`,
-  with the evidence :math:`\Delta_i = (b_i^TV^{-1}\tau')^2 / b_i^TV^{-1}b_i`, in squares of standard deviations. The
-  one with the most is the suspect, if none comes within `noise` standard deviations of it; else nobody is.
+  with the evidence :math:`\Delta_i = (b_i^TV^{-1}\tau')^2 / b_i^TV^{-1}b_i`. The one with the most is the suspect, if
+  it has more than any other by 1, so that what is no fault cannot have made the difference; else nobody is.
 
 So losses are found one after another, the sparsest explanation first. Thrust itself is not looked at: a vertical
 wind, a wrong mass, or a battery that is running down shows in it alone, and is nobody's fault.
@@ -65,10 +65,10 @@ def explained(
     most : scalar, N
         Thrust that a rotor may lack.
     apart : scalar
-        Standard deviations by which one explanation must be better than any other.
+        Standard deviations of noise by which one explanation must be better than any other.
     """
     rows = (matrix.roll, matrix.pitch, matrix.yaw)
-    variance = Vec3(*(a + b + TINY for a, b in zip(noise, model_error, strict=True)))
+    variance = Vec3(*(apart * apart * a + b + TINY for a, b in zip(noise, model_error, strict=True)))
     prior = flagged * (most * most)
 
     # What flagged rotors explain: P B' (B P B' + V)^-1 (-tau).
@@ -85,7 +85,7 @@ def explained(
     per_length = length.map(lambda size: 1.0 / maximum(size, TINY))
     evidence = along.map(_evidence, per_length, flagged)
     best, second = _two_largest(evidence)
-    clear = greater(best - second, apart * apart)
+    clear = greater(best - second, 1.0)
     alone = along * per_length
     suspect = evidence.map(lambda e: both(clear, both(greater(e, 0.0), negated(greater(best, e)))))
     residual = lacking + suspect.map(lambda on, f: select(on, f, 0.0), alone)
@@ -103,7 +103,7 @@ def _root(x: Scalar) -> Scalar:
 
 
 def _evidence(along: Scalar, per_length: Scalar, flagged: Scalar) -> Scalar:
-    """Of a thrust that is missing, in squares of standard deviations; 0 where a rotor would have to give more."""
+    """Of a thrust that is missing; 0 where a rotor would have to give more."""
     missing = both(greater(0.0, along), negated(flagged))
     return select(missing, along * along * per_length, 0.0)
 
