@@ -37,6 +37,7 @@ SEED = ("seed", "index")  # rows after the parameters
 # Parameters of which 0 means that their part of the model is not there. It then costs nothing: the numbers are the
 # same to the last bit.
 ABSENT_AT_ZERO = frozenset({"vehicle.rotor_reaction", "belief.rotor_reaction"})
+ABSENT_BELOW = ("vehicle.air.", "belief.air.")
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
 
 
@@ -55,6 +56,7 @@ class SameForAll(NamedTuple):
 
     absent: tuple[int, ...] = ()  # rows of the parameters that switch a part of the model off
     told: tuple[Any, ...] = ()  # what the parameters say without numbers
+    numbers: int = 0  # of the parameters
 
 
 class Section(NamedTuple):
@@ -87,9 +89,9 @@ def same_for_all(batch: Batch) -> SameForAll:
     absent = tuple(
         row
         for row, (name, value) in enumerate(zip(names, values, strict=True))
-        if name in ABSENT_AT_ZERO and not np.any(value)
+        if (name in ABSENT_AT_ZERO or name.startswith(ABSENT_BELOW)) and not np.any(value)
     )
-    return SameForAll(absent, tuple(statics(batch.parameters)))
+    return SameForAll(absent, tuple(statics(batch.parameters)), len(values))
 
 
 def trace(batch: Batch, same: SameForAll = SameForAll()) -> Traced:  # noqa: B008
@@ -169,6 +171,8 @@ def same_code(one: Batch, *others: Batch) -> bool:
     unlike: dict[tuple[float, ...], Batch] = {}
     for other in others:
         if statics(other.parameters) != statics(one.parameters):
+            return False
+        if len(flatten(other.parameters)) != len(flatten(one.parameters)):
             return False
         other_words, other_numbers = skeleton(other.loop)
         if other_words != words or any(

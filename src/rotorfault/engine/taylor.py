@@ -89,7 +89,7 @@ class _TaylorPlant:
         body_dot = plant.derivative(
             body,
             plant.forcing(
-                hy.time, rotors, plant.residual_speed(rotors, fault, parameters), fault, memory, parameters
+                hy.time, rotors, plant.residual_speed(rotors, fault, parameters), rotors, fault, memory, parameters
             ),
             command,
             parameters,

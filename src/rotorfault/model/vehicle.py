@@ -19,6 +19,7 @@ from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import Static
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
+from rotorfault.model.aerodynamics import Aerodynamics, still_air
 from rotorfault.model.signals import Wrench
 
 FEWEST_ROTORS, MOST_ROTORS = 3, 16
@@ -92,6 +93,7 @@ class Vehicle(NamedTuple):
     linear_drag: Scalar  # N s/m, force per speed relative to the air (k_d)
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
+    air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
 
     @property
@@ -101,6 +103,11 @@ class Vehicle(NamedTuple):
 
     def __repr__(self) -> str:
         return record_line(self)
+
+
+def in_air(vehicle: Vehicle) -> Vehicle:
+    """The same vehicle with coefficients of the air, all 0 if it has none."""
+    return vehicle if vehicle.air != () else vehicle._replace(air=still_air(vehicle.rotors))
 
 
 def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:

@@ -31,6 +31,7 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.one_line import cut
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.aerodynamics import Aerodynamics
 from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle, opposite_pairs
 
 LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
@@ -76,7 +77,59 @@ class Rotor(Strict):
     x: Length = Field(description="forward of the centre of mass, m")
     y: Length = Field(description="left of the centre of mass, m")
     yaw: Literal["+", "-"] = Field(description="'+' if its drag torque turns the body towards positive yaw")
+    z: Length | None = Field(default=None, description="above the centre of mass, m; 0 if not given")
     name: str = Field(default="", description="the vendor's name of the rotor")
+
+
+class AirFile(Strict):
+    """What the air does beyond linear drag; all 0 if not given. See `rotorfault.model.aerodynamics`."""
+
+    rotor_drag: Annotated[Quantity, _not_negative("kg/rad")] | None = Field(
+        default=None, description="kg/rad, force across a rotor's axis per rotor speed and airspeed"
+    )
+    inflow: Annotated[Quantity, _not_negative("kg/rad")] | None = Field(
+        default=None, description="kg/rad, thrust lost per rotor speed and speed along the axis"
+    )
+    translational_lift: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
+        default=None, description="kg/m, thrust won per squared airspeed across the axis"
+    )
+    flapping: Annotated[Quantity, _not_negative("kg m/rad")] | None = Field(
+        default=None, description="kg m/rad, moment of the blades per rotor speed and airspeed across the axis"
+    )
+    frame_drag_x: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
+        default=None, description="kg/m, force of the frame per squared airspeed, forward"
+    )
+    frame_drag_y: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
+        default=None, description="the same, left"
+    )
+    frame_drag_z: Annotated[Quantity, _not_negative("kg/m")] | None = Field(default=None, description="the same, up")
+    damping_roll: Annotated[Quantity, _not_negative("N m s")] | None = Field(
+        default=None, description="N m s, torque against a roll rate"
+    )
+    damping_pitch: Annotated[Quantity, _not_negative("N m s")] | None = Field(
+        default=None, description="the same for pitch"
+    )
+    damping_yaw: Annotated[Quantity, _not_negative("N m s")] | None = Field(
+        default=None, description="the same for yaw"
+    )
+    damping_squared_roll: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
+        default=None, description="N m s^2, torque against a squared roll rate"
+    )
+    damping_squared_pitch: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
+        default=None, description="the same for pitch"
+    )
+    damping_squared_yaw: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
+        default=None, description="the same for yaw"
+    )
+
+    def number(self, key: str) -> float:
+        """A coefficient, 0 where it is not given."""
+        quantity: Quantity | None = getattr(self, key)
+        return 0.0 if quantity is None else quantity.value
+
+    def along(self, key: str, names: tuple[str, str, str]) -> Vec3:
+        """Three coefficients, by the ends of their keys."""
+        return Vec3(*(self.number(f"{key}_{name}") for name in names))
 
 
 class VehicleFile(Strict):
@@ -105,6 +158,7 @@ class VehicleFile(Strict):
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
     )
+    air: AirFile | None = Field(default=None, description="what the air does beyond linear drag")
     rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
     @model_validator(mode="after")
@@ -279,7 +333,24 @@ class VehicleFile(Strict):
             linear_drag=self.linear_drag.value,
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
+            air=self._aerodynamics(),
             pairs=self.pairs or (),
+        )
+
+    def _aerodynamics(self) -> Aerodynamics | tuple[()]:
+        """Coefficients of the air; empty where all are 0, which costs nothing then."""
+        if self.air is None or not any(self.air.number(key) for key in AirFile.model_fields):
+            return ()
+        angles, axes = ("roll", "pitch", "yaw"), ("x", "y", "z")
+        return Aerodynamics(
+            rotor_z=PerRotor.of(0.0 if rotor.z is None else rotor.z.value for rotor in self.rotor),
+            rotor_drag=self.air.number("rotor_drag"),
+            inflow=self.air.number("inflow"),
+            translational_lift=self.air.number("translational_lift"),
+            flapping=self.air.number("flapping"),
+            frame_drag=self.air.along("frame_drag", axes),
+            damping=self.air.along("damping", angles),
+            damping_squared=self.air.along("damping_squared", angles),
         )
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
@@ -290,6 +361,11 @@ class VehicleFile(Strict):
         for number, rotor in enumerate(self.rotor, start=1):
             yield f"rotor.{number}.x", rotor.x
             yield f"rotor.{number}.y", rotor.y
+            if rotor.z is not None:
+                yield f"rotor.{number}.z", rotor.z
+        for key in () if self.air is None else AirFile.model_fields:
+            if (coefficient := getattr(self.air, key)) is not None:
+                yield f"air.{key}", coefficient
 
 
 def _sign(rotor: Rotor) -> float:

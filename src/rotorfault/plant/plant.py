@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, final
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
@@ -72,6 +73,7 @@ class Forcing(NamedTuple):
     wrench: Wrench  # of the rotors
     residual_speed: Scalar  # rad/s
     air: Air
+    speeds: PerRotor | tuple[()] = ()  # rad/s, of the rotors; empty where the air does not ask for them
 
 
 @final
@@ -185,7 +187,8 @@ class Plant:
         start, half, end = (self.residual_speed(output, fault, parameters) for output in lag.outputs)
         times, speeds = (time, time + 0.5 * dt, time + dt), (start - (start - end) * lag.sag, half, end)
         first, middle, last = (
-            self.forcing(*at, fault, held, parameters) for at in zip(times, lag.driving, speeds, strict=True)
+            self.forcing(*at, fault, held, parameters)
+            for at in zip(times, lag.driving, speeds, lag.outputs, strict=True)
         )
 
         def derivative(stopped: Any, forcing: Forcing) -> Any:
@@ -209,8 +212,9 @@ class Plant:
     def forcing(
         self,
         time: Scalar,
-        output: PerRotor,
+        driving: PerRotor,
         residual: Scalar,
+        output: PerRotor,
         fault: RotorFault,
         held: Held,
         parameters: PlantParameters,
@@ -220,10 +224,12 @@ class Plant:
         Parameters
         ----------
         time : scalar, s
-        output : PerRotor, N
-            Lag outputs.
+        driving : PerRotor, N
+            What an integration step takes for the lag outputs.
         residual : scalar, rad/s
             Omega of (4).
+        output : PerRotor, N
+            Lag outputs.
         fault : RotorFault
             Mean over the integration step.
         held : Held
@@ -233,9 +239,10 @@ class Plant:
         """
         vehicle = parameters.vehicle
         return Forcing(
-            wrench_of(vehicle, delivered_thrust(vehicle, output, fault)),
+            wrench_of(vehicle, delivered_thrust(vehicle, driving, fault)),
             residual,
             self.wind.at(time, held.wind, parameters.wind),
+            () if vehicle.air == () else true_rotor_speeds(vehicle, output, fault),
         )
 
     def derivative(self, stopped: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
@@ -254,6 +261,10 @@ class Plant:
         """
         vehicle, wrench, extra_W = parameters.vehicle, forcing.wrench, command.direct_acceleration_W
         body = self.turning(stopped, forcing.residual_speed, parameters)
+        if isinstance(forcing.speeds, PerRotor):
+            force_W, torque_B = pushed_by_air(vehicle, self.model.observe(body), forcing.air, forcing.speeds)
+            wrench = Wrench(wrench.thrust, wrench.torque_B + torque_B)
+            extra_W = extra_W + force_W / vehicle.mass
         if self.ground is not None:
             contact = self.ground.contact(self.model.observe(body), parameters.ground)
             wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
@@ -279,6 +290,9 @@ class Plant:
         body = self.model.observe(state.body)
         thrust = delivered_thrust(vehicle, state.rotors, fault)
         pushed_W = drag_acceleration(vehicle, air.velocity_W - body.v_W) + air.acceleration_W
+        speeds = true_rotor_speeds(vehicle, state.rotors, fault)
+        if vehicle.air != ():
+            pushed_W = pushed_W + pushed_by_air(vehicle, body, air, speeds)[0] / vehicle.mass
         ground_force: Scalar = 0.0
         if self.ground is not None:
             contact = self.ground.contact(body, parameters.ground)
@@ -288,7 +302,7 @@ class Plant:
             state=body,
             specific_force_B=lift_B + body.q_WB.matrix().T @ pushed_W,
             thrust=thrust,
-            rotor_speed=true_rotor_speeds(vehicle, state.rotors, fault),
+            rotor_speed=speeds,
             loss=true_loss(vehicle, state.rotors, fault),
             air=air,
             ground_force=ground_force,
@@ -301,3 +315,22 @@ class Plant:
     def true_loss(self, state: PlantState, held: Held, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """Lost share of each rotor's thrust by the faults of a time in s, with the rotors as they turn now."""
         return true_loss(parameters.vehicle, state.rotors, self.fault(time, held, parameters))
+
+
+def pushed_by_air(vehicle: Vehicle, state: State, air: Air, speeds: PerRotor) -> tuple[Vec3, Vec3]:
+    """Force in N, world frame, and torque in N m, body axes, of the air beyond linear drag.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        With `air`.
+    state : State
+    air : Air
+    speeds : PerRotor, rad/s
+        Of the rotors.
+    """
+    assert isinstance(vehicle.air, Aerodynamics)
+    R_WB = state.q_WB.matrix()
+    airspeed_B = R_WB.T @ (state.v_W - air.velocity_W)
+    force_B, torque_B = air_wrench(vehicle.air, vehicle.rotor_x, vehicle.rotor_y, speeds, airspeed_B, state.omega_B)
+    return R_WB @ force_B, torque_B
