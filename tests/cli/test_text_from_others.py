@@ -11,7 +11,10 @@ import pytest
 from command_line import assert_refused, run, started
 
 import rotorfault as rf
+from rotorfault.report import figures
 
+# To draw the others shows the same, and takes most of the time.
+ONE_FIGURE = "from rotorfault.report import figures\nfigures.FIGURES = {'position': figures.FIGURES['position']}"
 SHORT = ("--set", "duration=0.1", "--set", "fault=[]", "--no-figures")
 
 
@@ -49,7 +52,10 @@ def test_a_study_is_named_like_a_folder(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_markup_in_names_is_text(tmp_path: Path) -> None:
+def test_markup_in_names_is_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # All names stand in each figure: one is enough, and drawing is what takes time.
+    monkeypatch.setattr(figures, "FIGURES", {"position": figures.FIGURES["position"]})
+    monkeypatch.setattr(figures, "detail", lambda drawn: None)
     files = []
     for number, name in enumerate(("[red]loud[/red]", "[/]", "$\\frac{")):
         flight = rf.fly("paper-set-point", "smc", settings={"duration": 0.05, "fault": [], "name": name})
@@ -58,6 +64,7 @@ def test_markup_in_names_is_text(tmp_path: Path) -> None:
     done = run("compare", *files, "--out", str(tmp_path / "figures"))
     assert done.returncode == 0, done.stderr
     assert "[red]loud[/red], [/]" in done.stdout
+    assert (tmp_path / "figures" / "position.png").is_file()
 
 
 def test_a_terminal_of_few_characters_gets_the_others_written_out(
@@ -77,10 +84,12 @@ def test_a_terminal_of_few_characters_gets_the_others_written_out(
     out = str(tmp_path / "zürich")
     # And there is no cache of compiled loops.
     short = ("--engine", "python", "--set", "duration=0.1", "--set", "fault=[]")
-    done = started("fly", "paper-set-point", *short, "--out", out)
+    done = started("fly", "paper-set-point", *short, "--out", out, before=ONE_FIGURE)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "zürich" / "position.png").is_file()
-    done = started("compare", f"{out}/flight.nc", f"{out}/flight.nc", "--out", str(tmp_path / "both"))
+    done = started(
+        "compare", f"{out}/flight.nc", f"{out}/flight.nc", "--out", str(tmp_path / "both"), before=ONE_FIGURE
+    )
     assert done.returncode == 0, done.stderr
     assert "\x1b" not in done.stdout
     table, _, _ = done.stdout.partition("wrote")

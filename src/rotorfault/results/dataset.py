@@ -17,6 +17,7 @@ import xarray as xr
 from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
+from rotorfault.results.netcdf import plain_arrays
 from rotorfault.results.seal import DIGESTS, changed_attributes, changed_variables
 from rotorfault.results.whole import json_table
 
@@ -54,6 +55,8 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         If it is missing, unreadable, truncated, or no flight of this program.
     """
     require(path, (str, Path), "flight", "the path of a flight.nc")
+    if (quick := _as_written(Path(path))) is not None:
+        return as_dataset(quick)
     data = _from(Path(path), _dataset)
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
@@ -95,6 +98,23 @@ def _from(path: Path, read: Callable[[Path], Content]) -> Content:
         # h5py and xarray raise a dozen kinds for files that are truncated or no HDF5 at all.
         reason = " ".join(str(error).split())[:120]
         raise InputError(f"{path}: cannot be read as a flight ({reason}); fly it again") from None
+
+
+def _as_written(path: Path) -> FlightData | None:
+    """A file that is what `write_netcdf` wrote to the last bit, as its digests say; None for any other.
+
+    In a fifth of the time that xarray takes, which asks about each variable again and again.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            read = plain_arrays(file)
+    except Exception:
+        return None  # `_dataset` meets the same, and says what it is
+    if read.attrs.get("format") != FORMAT or DIGESTS not in read.attrs:
+        return None
+    if changed_attributes(read.attrs) or changed_variables(read):
+        return None
+    return FlightData(read.variables, read.coordinates, {k: v for k, v in read.attrs.items() if k != DIGESTS})
 
 
 def _dataset(path: Path) -> xr.Dataset:
