@@ -60,10 +60,9 @@ test: .venv/.stamp-develop ## Run the tests but those that take long
 test-long: .venv/.stamp-develop ## Run the tests that take long
 	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m long
 
-# Where something flies. What reads files, draws, judges or counts is the same with and without a compiler.
-NUMPY_TESTS := tests/analysis tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli \
-  tests/engine tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference \
-  tests/results tests/scenario
+# Where something flies. What reads files, draws, judges, counts or linearises is the same with and without a compiler.
+NUMPY_TESTS := tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli tests/engine \
+  tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference/test_own_signals.py
 
 test-numpy: .venv-numpy/.stamp ## Run the tests in which something flies without llvmlite, in .venv-numpy
 	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long" $(NUMPY_TESTS)

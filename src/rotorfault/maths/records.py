@@ -84,7 +84,7 @@ def unflatten(template: R, leaves: Iterator[Scalar] | list[Scalar]) -> R:
     def build(part: Any) -> Any:
         if isinstance(part, tuple):
             values = [build(inner) for inner in part]
-            return type(part)._make(values) if hasattr(part, "_fields") else tuple(values)
+            return _tuple_like(part, values)
         if isinstance(part, Value):
             return type(part)(*[next(source) for _ in part.__slots__])
         return next(source)
@@ -93,6 +93,11 @@ def unflatten(template: R, leaves: Iterator[Scalar] | list[Scalar]) -> R:
         return build(template)  # type: ignore[no-any-return]
     except StopIteration:
         raise ValueError("fewer scalars than the record has fields") from None
+
+
+def _tuple_like(record: Any, values: list[Any]) -> Any:
+    """A NamedTuple of the same type, or a tuple."""
+    return type(record)._make(values) if hasattr(record, "_fields") else tuple(values)
 
 
 def select_record(condition: Scalar, a: R, b: R) -> R:
@@ -105,7 +110,7 @@ def _selected(condition: Scalar, a: Any, b: Any) -> Any:
         return a
     if isinstance(a, tuple):
         values = [_selected(condition, *pair) for pair in zip(a, b, strict=True)]
-        return type(a)._make(values) if hasattr(a, "_fields") else tuple(values)
+        return _tuple_like(a, values)
     if isinstance(a, Value):
         pairs = zip(a, b, strict=True)
         return type(a)(*[one if one is other else select(condition, one, other) for one, other in pairs])

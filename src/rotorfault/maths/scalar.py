@@ -39,8 +39,7 @@ class _Derived:
     less_equal: Any
     select: Any
 
-    @staticmethod
-    def reciprocal(x: Scalar) -> Scalar:
+    def reciprocal(self, x: Scalar) -> Scalar:
         return 1.0 / x
 
     def minimum(self, a: Scalar, b: Scalar) -> Scalar:

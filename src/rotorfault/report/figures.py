@@ -109,7 +109,8 @@ def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[st
 
 def _write(figure: Figure, kind: str, path: Path) -> None:
     if kind == "png" and isinstance(figure.canvas, FigureCanvasAgg) and figure.dpi == DPI:
-        figure.canvas.print_png(path)  # the same bytes; `savefig` would draw once more, to find the layout
+        # The same bytes; `savefig` would draw once more, to find the layout.
+        figure.canvas.print_png(path)  # type: ignore[no-untyped-call]
         return
     # Without the date, the same flight gives the same bytes.
     undated: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
