@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper ranges test test-numpy test-bounds web fuzz lint types bench peers maps benchmarks docs \
+.PHONY: help venv paper ranges test test-long test-numpy test-bounds web fuzz lint types bench peers maps benchmarks docs \
   docs-long clean check-python
 
 help: ## List the targets
@@ -54,16 +54,18 @@ paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and cl
 ranges: .venv/.stamp-develop ## Search gains anew and give the paper's Table 1 as ranges (15 min on 2 idle cores)
 	.venv/$(BIN)/rotorfault ranges --out results/ranges
 
-test: .venv/.stamp-develop ## Run the tests
-	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile
+test: .venv/.stamp-develop ## Run the tests but those that take long
+	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long"
 
-# Where something flies. What reads files, draws, judges or counts is the same with and without a compiler.
-NUMPY_TESTS := tests/analysis tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli \
-  tests/engine tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference \
-  tests/results tests/scenario
+test-long: .venv/.stamp-develop ## Run the tests that take long
+	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m long
+
+# Where something flies. What reads files, draws, judges, counts or linearises is the same with and without a compiler.
+NUMPY_TESTS := tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli tests/engine \
+  tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference/test_own_signals.py
 
 test-numpy: .venv-numpy/.stamp ## Run the tests in which something flies without llvmlite, in .venv-numpy
-	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile $(NUMPY_TESTS)
+	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long" $(NUMPY_TESTS)
 
 # Both ends of every bound in pyproject.toml: the lowest versions that it allows, and the newest that there are.
 BOUNDS_EXTRAS := flightcode,tune,cluster

@@ -102,6 +102,7 @@ def measured() -> dict[str, Any]:
     return found
 
 
+@pytest.mark.long
 def test_the_truth_is_much_better_than_what_it_judges(measured: dict[str, Any]) -> None:
     for flight in FLIGHTS:
         parts = measured["truth"]["flights"][flight]
@@ -111,6 +112,7 @@ def test_the_truth_is_much_better_than_what_it_judges(measured: dict[str, Any]) 
         assert 100.0 * max(parts["tolerance_m"], parts["rk4_m"]) < least
 
 
+@pytest.mark.long
 def test_what_is_reported(measured: dict[str, Any]) -> None:
     assert list(measured["curves"]) == [SAMPLED, HELD]
     assert 0.0 < measured["cpu_share"] < 1.5
@@ -129,6 +131,7 @@ def test_what_is_reported(measured: dict[str, Any]) -> None:
     assert measured["curves"][SAMPLED]["points"][0] == measured["curves"][HELD]["points"][0]
 
 
+@pytest.mark.long
 def test_the_cheapest_step_is_within_the_limits(measured: dict[str, Any]) -> None:
     """Noise and a wrong mass move the flight by some tenths of a millimetre; a thousandth of that is the limit."""
     assert 1e-8 < measured["limit_m"] < 1e-5
@@ -203,6 +206,7 @@ def test_no_label_covers_another(peers: dict[str, Any] | None) -> None:
     assert labels[0] == f"rotorfault RK4, {SAMPLED}"
 
 
+@pytest.mark.long
 def test_the_measured_points_are_drawn(measured: dict[str, Any]) -> None:
     figure = draw(measured)
     check_nothing_covered("accuracy", figure)

@@ -7,14 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 from cascade_step import cascade
-from engine_flights import FAULTS, OWN, Array, assert_same, every_engine, faulty_case_one, run, short
+from engine_flights import FAULTS, OWN, Array, assert_same, every_engine, faulty_case_one, run, set_chunk, short
 from gates import needs_simd
 
 import rotorfault
 from rotorfault.autopilot.control.cascade import limited_force
 from rotorfault.base.errors import InputError
 from rotorfault.engine import default_engine, have_simd, load_engine
-from rotorfault.engine.batch import CHUNK
 from rotorfault.flight.assembly import assemble_all
 from rotorfault.maths.geometry import Vec3
 from rotorfault.model.block import Context
@@ -23,7 +22,7 @@ from rotorfault.scenario.neighbours import neighbour
 
 
 def test_python_agrees_with_simd(simd_faulty_case_one: Array) -> None:
-    """1 s of case 1 with both faults at 0.4 s."""
+    """Half a second of case 1 with both faults at 0.2 s."""
     found = run(faulty_case_one(), "python").signals
     assert found[-1, OWN.rows.index("fault_flag.r1"), 0] == 1.0
     assert found[-1, OWN.rows.index("fault_flag.r3"), 0] == 1.0
@@ -31,12 +30,12 @@ def test_python_agrees_with_simd(simd_faulty_case_one: Array) -> None:
 
 
 def test_numpy_agrees_with_simd() -> None:
-    """1 s of case 1, and of a neighbour whose faults come earlier, at 2 ms."""
+    """Half a second of case 1, and of a neighbour whose faults come earlier, at 2 ms."""
     pytest.importorskip("llvmlite")
     base = faulty_case_one(period=0.002, step=0.002)
-    batch = assemble_all([base, neighbour(base, 3, onset=(0.3, 0.3))])
+    batch = assemble_all([base, neighbour(base, 3, onset=(0.15, 0.15))])
     found, wanted = run(batch, "numpy").signals, run(batch, "simd").signals
-    assert found.shape == (500, len(batch.loop.layout), 2)
+    assert found.shape == (250, len(batch.loop.layout), 2)
     assert (found[-1, OWN.rows.index("fault_flag.r1")] == 1.0).all()
     assert_same(found, wanted)
 
@@ -67,9 +66,10 @@ def test_late_readings_fly_the_same_on_all_engines(engine: str) -> None:
 
 
 @needs_simd
-def test_noise_crosses_chunks_the_same_on_all_engines() -> None:
+def test_noise_crosses_chunks_the_same_on_all_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """More steps than are drawn at a time."""
-    long = short(duration=0.005 * (CHUNK + 40))
+    set_chunk(monkeypatch, 60)
+    long = short(duration=0.005 * 100)
     assert_same(run(long, "python").signals, run(long, "simd").signals)
 
 
@@ -91,7 +91,7 @@ def test_without_llvmlite_the_other_engines_serve(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("period", [0.003, 0.01])
 def test_many_integration_steps_in_a_period_agree_too(period: float) -> None:
     """The engine then compiles the sampling instant and the integration step apart."""
-    settings = {"duration": 1.2, "period": period, "diagnosis.poles": [60.0, 80.0]} | FAULTS
+    settings = {"duration": 0.6, "period": period, "diagnosis.poles": [60.0, 80.0]} | FAULTS
     python = rotorfault.fly("paper-set-point", settings=settings, engine="python")
     simd = rotorfault.fly("paper-set-point", settings=settings, engine="simd")
     assert np.abs(python.data["position"] - simd.data["position"]).max() < 1e-9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from engine_flights import POSITION, every_engine, run, short
+from engine_flights import POSITION, every_engine, run, set_chunk, short
 
 from rotorfault.engine import ENGINES, have_simd
 from rotorfault.flight.assembly import assemble, assemble_all
@@ -16,12 +16,6 @@ CHUNK = 60  # steps in these tests: how many there are changes nothing but when 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     set_chunk(monkeypatch, CHUNK)
-
-
-def set_chunk(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
-    for module in ("batch", "simd"):
-        if module != "simd" or have_simd():
-            monkeypatch.setattr(f"rotorfault.engine.{module}.CHUNK", steps)
 
 
 def test_only_wanted_signals_are_recorded() -> None:

@@ -47,6 +47,12 @@ BROKEN: list[tuple[type[Any], str, str]] = [
 ]
 
 
+@pytest.fixture(autouse=True)
+def shorter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a part here does wrong, it has done after 0.2 s."""
+    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 110)
+
+
 @cache
 def refusal(part: type[Any]) -> str:
     """What `check_block` says of a part that breaks a rule."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from engine_flights import set_chunk
 
 import rotorfault as rf
 from rotorfault.results.flight_data import FlightData
@@ -20,11 +21,12 @@ LOST: dict[str, Any] = {
 
 @pytest.mark.parametrize("engine", ["python", "simd"])
 @pytest.mark.parametrize("every", [1, 8])
-def test_all_records_are_handed_over_in_order(engine: str, every: int) -> None:
+def test_all_records_are_handed_over_in_order(engine: str, every: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    set_chunk(monkeypatch, 60)
     if engine == "simd":
         pytest.importorskip("llvmlite")
     pieces: list[FlightData] = []
-    settings = SHORT | {"record_period": every * 1e-3} if every > 1 else SHORT
+    settings = {"duration": 0.15} | ({"record_period": every * 1e-3} if every > 1 else {})
     flight = rf.fly("paper-set-point", settings=settings, engine=engine, follow=pieces.append)
     assert len(pieces) == 3
     assert pieces[0].attrs["title"] == "paper-set-point flown by roismc"

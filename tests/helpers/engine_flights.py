@@ -9,7 +9,7 @@ import pytest
 from gates import needs_simd
 from numpy.typing import NDArray
 
-from rotorfault.engine import ENGINES, load_engine
+from rotorfault.engine import ENGINES, have_simd, load_engine
 from rotorfault.engine.batch import Batch, Recording, no_watch
 from rotorfault.flight.assembly import assemble
 from rotorfault.loop.recorded import LoopSignals
@@ -25,12 +25,12 @@ _NEEDS = {"simd": [needs_simd]}
 every_engine = pytest.mark.parametrize("engine", [pytest.param(name, marks=_NEEDS.get(name, [])) for name in ENGINES])
 
 
-FAULTS = {"fault.0.time": 0.4, "fault.1.time": 0.4}  # of case 1, early
+FAULTS = {"fault.0.time": 0.2, "fault.1.time": 0.2}  # of case 1, early
 
 
 def faulty_case_one(**changes: Any) -> Scenario:
-    """1 s of case 1 with both faults in it."""
-    return load_scenario("paper-set-point", {"controller.kind": "roismc", "duration": 1.0} | FAULTS | changes)
+    """Half a second of case 1 with both faults in it."""
+    return load_scenario("paper-set-point", {"controller.kind": "roismc", "duration": 0.5} | FAULTS | changes)
 
 
 def short(**tables: Any) -> Scenario:
@@ -55,6 +55,13 @@ def short(**tables: Any) -> Scenario:
 
 def run(batch: Batch | Scenario, engine: str, watch: Any = no_watch) -> Recording:
     return load_engine(engine)(assemble(batch) if isinstance(batch, Scenario) else batch, watch)
+
+
+def set_chunk(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
+    """Let engines look about after that many steps: how many there are changes nothing else."""
+    for module in ("batch", "simd"):
+        if module != "simd" or have_simd():
+            monkeypatch.setattr(f"rotorfault.engine.{module}.CHUNK", steps)
 
 
 def assert_same(found: Array, wanted: Array) -> None:

@@ -53,6 +53,7 @@ def run(line: str) -> str:
     return result.output
 
 
+@pytest.mark.long
 @needs_simd
 def test_everything_on_the_page_runs(folder: Path) -> None:
     pytest.importorskip("cma")

@@ -14,6 +14,7 @@ from made_up_records import LAYOUT
 import rotorfault as rf
 from rotorfault.results import dataset, netcdf
 from rotorfault.results.flight_data import FORMAT, FlightData, flight_data
+from rotorfault.results.seal import sealed
 
 ATTRIBUTES: dict[str, Any] = {
     "format": FORMAT, "title": "Grüße", "own_controller": "", "seed": 7, "thrust_max": 9.81, "end_time": 0.1,
@@ -66,6 +67,26 @@ def test_values_come_back_to_the_last_bit(tmp_path: Path) -> None:
         assert found[name].values.tobytes() == np.ascontiguousarray(variable.values).tobytes(), name
         assert found[name].attrs == variable.attrs, name
     assert found.attrs == ATTRIBUTES
+
+
+@pytest.mark.parametrize("records", [1, 50])
+def test_a_sealed_flight_is_read_as_by_xarray(records: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The short way, which such a file takes, leads to the same dataset."""
+    path = tmp_path / "flight.nc"
+    netcdf.write_netcdf(sealed(made(records)), path)
+    assert dataset._as_written(path) is not None
+    short = dataset.read_netcdf(path)
+    monkeypatch.setattr(dataset, "_as_written", lambda path: None)
+    long = dataset.read_netcdf(path)
+    xr.testing.assert_identical(short, long)
+    assert list(short.variables) == list(long.variables)
+    assert list(short.attrs) == list(long.attrs)
+    for name in long.variables:
+        assert short[name].dtype == long[name].dtype, name
+        assert short[name].values.flags.writeable == long[name].values.flags.writeable, name
+        assert [type(value) for value in short[name].attrs.values()] == [
+            type(value) for value in long[name].attrs.values()
+        ]
 
 
 def test_dimensions_are_those_of_netcdf_4(tmp_path: Path) -> None:

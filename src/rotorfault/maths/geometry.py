@@ -9,6 +9,7 @@ Rotations are in `rotorfault.maths.rotation`.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import ClassVar, overload
 
@@ -50,6 +51,9 @@ class Vec3(Value):
 
     def __init__(self, x: Scalar, y: Scalar, z: Scalar) -> None:
         self.x, self.y, self.z = x, y, z
+
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter((self.x, self.y, self.z))
 
     @classmethod
     def of(cls, components: Iterable[Scalar]) -> Vec3:
@@ -122,6 +126,9 @@ class Mat3(Value):
         self.yx, self.yy, self.yz = yx, yy, yz
         self.zx, self.zy, self.zz = zx, zy, zz
 
+    def __iter__(self) -> Iterator[Scalar]:
+        return iter((self.xx, self.xy, self.xz, self.yx, self.yy, self.yz, self.zx, self.zy, self.zz))
+
     @classmethod
     def diagonal(cls, d: Vec3) -> Mat3:
         """Diagonal matrix."""
@@ -158,19 +165,19 @@ class Mat3(Value):
 
     def map(self, function: Callable[[Scalar], Scalar]) -> Mat3:
         """Apply a function to each element."""
-        return Mat3(*(function(element) for element in self))
+        return Mat3(*map(function, self))
 
     def __add__(self, other: Mat3) -> Mat3:
-        return Mat3(*(a + b for a, b in zip(self, other, strict=True)))
+        return Mat3(*map(operator.add, self, other))
 
     def __sub__(self, other: Mat3) -> Mat3:
-        return Mat3(*(a - b for a, b in zip(self, other, strict=True)))
+        return Mat3(*map(operator.sub, self, other))
 
     def __neg__(self) -> Mat3:
-        return Mat3(*(-a for a in self))
+        return Mat3(*map(operator.neg, self))
 
     def __mul__(self, factor: Scalar) -> Mat3:
-        return Mat3(*(a * factor for a in self))
+        return Mat3(*[a * factor for a in self])
 
     __rmul__ = __mul__
 
@@ -201,7 +208,7 @@ class Mat3(Value):
 
     def times(self, other: Mat3) -> Mat3:
         """Elementwise product."""
-        return Mat3(*(a * b for a, b in zip(self, other, strict=True)))
+        return Mat3(*map(operator.mul, self, other))
 
     def trace(self) -> Scalar:
         """Sum of the diagonal."""
@@ -286,16 +293,16 @@ class PerRotor(Value):
 
     def _with(self, other: PerRotor | Scalar, operation: Callable[[Scalar, Scalar], Scalar]) -> PerRotor:
         if isinstance(other, PerRotor):
-            return PerRotor(*(operation(a, b) for a, b in zip(self._values, other._values, strict=True)))
-        return PerRotor(*(operation(a, other) for a in self._values))
+            return self.map(operation, other)
+        return PerRotor(*map(operation, self._values, (other,) * len(self._values)))
 
     def __add__(self, other: PerRotor | Scalar) -> PerRotor:
-        return self._with(other, lambda a, b: a + b)
+        return self._with(other, operator.add)
 
     __radd__ = __add__
 
     def __sub__(self, other: PerRotor | Scalar) -> PerRotor:
-        return self._with(other, lambda a, b: a - b)
+        return self._with(other, operator.sub)
 
     def __rsub__(self, other: Scalar) -> PerRotor:
         return self._with(other, lambda a, b: b - a)
@@ -304,16 +311,20 @@ class PerRotor(Value):
         return PerRotor(*(-a for a in self._values))
 
     def __mul__(self, other: PerRotor | Scalar) -> PerRotor:
-        return self._with(other, lambda a, b: a * b)
+        return self._with(other, operator.mul)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: PerRotor | Scalar) -> PerRotor:
-        return self._with(other, lambda a, b: a / b)
+        return self._with(other, operator.truediv)
 
     def map(self, function: Callable[..., Scalar], *others: PerRotor) -> PerRotor:
         """Apply ``function(own, *others)`` rotor by rotor."""
-        return PerRotor(*(function(*values) for values in zip(self, *others, strict=True)))
+        count = len(self._values)
+        for other in others:
+            if len(other) != count:
+                raise ValueError(f"numbers of {count} rotors and of {len(other)}; allowed: of equally many")
+        return PerRotor(*map(function, self._values, *others))
 
     def dot(self, other: PerRotor) -> Scalar:
         """Sum over the rotors of the products."""

@@ -53,10 +53,20 @@ def flatten(record: Any) -> list[Scalar]:
     -------
     list of scalars
     """
-    parts = _parts(record)
-    if parts is None:
-        return [record]
-    return [leaf for _, part in parts for leaf in flatten(part)]
+    leaves: list[Scalar] = []
+    _collect(record, leaves)
+    return leaves
+
+
+def _collect(record: Any, leaves: list[Scalar]) -> None:
+    """Append the scalars of a record. Every step of a flight on floats comes here many times."""
+    if isinstance(record, tuple):
+        for part in record:
+            _collect(part, leaves)
+    elif isinstance(record, Value):
+        leaves.extend(record)
+    elif not isinstance(record, Static):
+        leaves.append(record)
 
 
 def leaf_names(record: Any, prefix: str = "") -> list[str]:
@@ -84,20 +94,22 @@ def unflatten(template: R, leaves: Iterator[Scalar] | list[Scalar]) -> R:
     source = iter(leaves)
 
     def build(part: Any) -> Any:
-        parts = _parts(part)
-        if parts is None:
-            try:
-                return next(source)
-            except StopIteration:
-                raise ValueError("fewer scalars than the record has fields") from None
-        if isinstance(part, Static):
-            return part
-        values = [build(inner) for _, inner in parts]
-        if isinstance(part, Value) or hasattr(part, "_fields"):
-            return type(part)(*values)
-        return tuple(values)
+        if isinstance(part, tuple):
+            values = [build(inner) for inner in part]
+            return _tuple_like(part, values)
+        if isinstance(part, Value):
+            return type(part)(*[next(source) for _ in part.names])
+        return part if isinstance(part, Static) else next(source)
 
-    return build(template)  # type: ignore[no-any-return]
+    try:
+        return build(template)  # type: ignore[no-any-return]
+    except StopIteration:
+        raise ValueError("fewer scalars than the record has fields") from None
+
+
+def _tuple_like(record: Any, values: list[Any]) -> Any:
+    """A NamedTuple of the same type, or a tuple."""
+    return type(record)._make(values) if hasattr(record, "_fields") else tuple(values)
 
 
 def statics(record: Any) -> list[Static]:
@@ -110,12 +122,19 @@ def statics(record: Any) -> list[Static]:
 
 def select_record(condition: Scalar, a: R, b: R) -> R:
     """`rotorfault.maths.scalar.select` on every scalar of two records of the same shape."""
-    from_b = iter(flatten(b))
-    return unflatten(a, [_select(condition, leaf, next(from_b)) for leaf in flatten(a)])
+    return _selected(condition, a, b)  # type: ignore[no-any-return]
 
 
-def _select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
-    return a if a is b else select(condition, a, b)
+def _selected(condition: Scalar, a: Any, b: Any) -> Any:
+    if a is b:
+        return a
+    if isinstance(a, tuple):
+        values = [_selected(condition, *pair) for pair in zip(a, b, strict=True)]
+        return _tuple_like(a, values)
+    if isinstance(a, Value):
+        pairs = zip(a, b, strict=True)
+        return type(a)(*[one if one is other else select(condition, one, other) for one, other in pairs])
+    return select(condition, a, b)
 
 
 @lru_cache(maxsize=256)

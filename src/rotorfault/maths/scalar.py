@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from types import ModuleType
 from typing import Any, TypeAlias
@@ -39,6 +39,9 @@ class _Derived:
     less_equal: Any
     select: Any
 
+    def reciprocal(self, x: Scalar) -> Scalar:
+        return 1.0 / x
+
     def minimum(self, a: Scalar, b: Scalar) -> Scalar:
         return self.select(self.less(a, b), a, self.select(self.less_equal(b, a), b, a + b))
 
@@ -49,8 +52,24 @@ class _Derived:
         return self.select(self.less(x, 0.0), -x, x)
 
 
-class _Floats(_Derived):
+def _of_angle(function: Callable[[float], float]) -> Callable[[float], float]:
+    return lambda x: function(x) if abs(x) < math.inf else NAN
+
+
+class _Floats:
     """Python floats. ``math`` raises where IEEE arithmetic gives NaN or infinity; here it must not."""
+
+    @staticmethod
+    def minimum(a: float, b: float) -> float:
+        return a if a < b else b if b <= a else a + b
+
+    @staticmethod
+    def maximum(a: float, b: float) -> float:
+        return a if b < a else b if a <= b else a + b
+
+    @staticmethod
+    def absolute(x: float) -> float:
+        return -x if x < 0.0 else x
 
     @staticmethod
     def sqrt(x: float) -> float:
@@ -65,21 +84,10 @@ class _Floats(_Derived):
         return math.exp(x) if not x > 709.0 else math.inf
 
     @staticmethod
-    def sin(x: float) -> float:
-        return math.sin(x) if abs(x) < math.inf else NAN
-
-    @staticmethod
-    def cos(x: float) -> float:
-        return math.cos(x) if abs(x) < math.inf else NAN
-
-    @staticmethod
-    def tan(x: float) -> float:
-        return math.tan(x) if abs(x) < math.inf else NAN
-
-    @staticmethod
     def asin(x: float) -> float:
         return math.asin(x) if -1.0 <= x <= 1.0 else NAN
 
+    sin, cos, tan = (staticmethod(_of_angle(function)) for function in (math.sin, math.cos, math.tan))
     atan2 = staticmethod(math.atan2)
     tanh = staticmethod(math.tanh)
 
@@ -105,10 +113,7 @@ class _Arrays(_Derived):
 
     sqrt, exp, sin, cos, tan = np.sqrt, np.exp, np.sin, np.cos, np.tan
     asin, atan2, tanh, nearest = np.arcsin, np.arctan2, np.tanh, np.rint
-
-    @staticmethod
-    def reciprocal(x: Scalar) -> Scalar:
-        return 1.0 / x
+    minimum, maximum, absolute = np.minimum, np.maximum, np.absolute  # type: ignore[assignment]
 
     @staticmethod
     def less(a: Scalar, b: Scalar) -> Scalar:
@@ -178,10 +183,6 @@ class _Casadi(_Derived):
         self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
         self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
 
-    @staticmethod
-    def reciprocal(x: Scalar) -> Scalar:
-        return 1.0 / x
-
     def nearest(self, x: Scalar) -> Scalar:
         return self._module.floor(x + 0.5)
 
@@ -194,10 +195,6 @@ class _Terms(_Derived):
         self.less, self.less_equal, self.select = module.less, module.less_equal, module.select
         self.minimum, self.maximum = module.minimum, module.maximum  # type: ignore[method-assign]
         self.absolute = module.absolute  # type: ignore[method-assign]
-
-    @staticmethod
-    def reciprocal(x: Scalar) -> Scalar:
-        return 1.0 / x
 
     def __getattr__(self, name: str) -> Any:
         return partial(self._function, "round" if name == "nearest" else name)
@@ -234,8 +231,7 @@ def _of(*arguments: Scalar) -> Any:
     """Choose the functions by all arguments: any array or symbol among them outranks the floats."""
     for argument in arguments:
         kind = type(argument)
-        functions = _BY_TYPE.get(kind) or _adopt(kind)
-        if functions is not _FLOATS:
+        if kind is not float and (functions := _BY_TYPE.get(kind) or _adopt(kind)) is not _FLOATS:
             return functions
     return _FLOATS
 
@@ -293,6 +289,8 @@ def tanh(x: Scalar) -> Scalar:
 
 def less(a: Scalar, b: Scalar) -> Scalar:
     """1 where a < b, else 0; 0 where either is NaN."""
+    if type(a) is type(b) is float:
+        return 1.0 if a < b else 0.0
     return _of(a, b).less(a, b)
 
 
@@ -336,6 +334,8 @@ def negated(a: Scalar) -> Scalar:
 
 def select(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """`a` where the condition is 1, `b` where it is 0. Both are computed; only the taken one is passed on."""
+    if type(a) is type(b) is type(condition) is float:  # the short way of what is asked for most often
+        return a if condition else b
     return _of(condition, a, b).select(condition, a, b)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rotorfault.base.errors import InputError
@@ -94,17 +95,23 @@ def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[st
     with rc_context(STYLE):
         for name, figure in figures.items():
             engine = figure.get_layout_engine()
+            if engine is not None:
+                # Found once for all formats: it is what takes time.
+                engine.execute(figure)
+                figure.set_layout_engine("none")
             for kind in formats:
                 paths.append(folder / f"{name}.{kind}")
                 write_atomically(paths[-1], partial(_write, figure, kind))
-                # The layout that was found for the first format holds for the others, and is what takes time.
-                figure.set_layout_engine("none")
             if engine is not None:
                 figure.set_layout_engine(engine)
     return paths
 
 
 def _write(figure: Figure, kind: str, path: Path) -> None:
+    if kind == "png" and isinstance(figure.canvas, FigureCanvasAgg) and figure.dpi == DPI:
+        # The same bytes; `savefig` would draw once more, to find the layout.
+        figure.canvas.print_png(path)  # type: ignore[no-untyped-call]
+        return
     # Without the date, the same flight gives the same bytes.
     undated: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     figure.savefig(path, format=kind, dpi=DPI, metadata=undated.get(kind))

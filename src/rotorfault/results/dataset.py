@@ -18,6 +18,7 @@ from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import instead_of_folder
 from rotorfault.results.flight_data import FORMAT, FlightData, Variable
+from rotorfault.results.netcdf import plain_arrays
 from rotorfault.results.seal import DIGESTS, changed_attributes, changed_variables
 from rotorfault.results.whole import json_table
 
@@ -56,6 +57,8 @@ def read_netcdf(path: str | Path) -> xr.Dataset:
         If it is missing, unreadable, truncated, or no flight of this program.
     """
     require(path, (str, Path), "flight", "the path of a flight.nc")
+    if (quick := _as_written(Path(path))) is not None:
+        return as_dataset(quick)
     data = _from(Path(path), _dataset)
     form = data.attrs.get("format")
     if form == OLD_FORMAT:
@@ -106,6 +109,23 @@ def _from(path: Path, read: Callable[[Path], Content]) -> Content:
                 f"{path}: is cut or damaged ({path.stat().st_size:,} bytes); restore a copy, or fly it again"
             ) from None
         raise InputError(f"{path}: is no flight file; give a flight.nc that 'rotorfault fly' wrote") from None
+
+
+def _as_written(path: Path) -> FlightData | None:
+    """A file that is what `write_netcdf` wrote to the last bit, as its digests say; None for any other.
+
+    In a third of the time that xarray takes, and less for short flights: it asks about each variable again and again.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            read = plain_arrays(file)
+    except Exception:
+        return None  # `_dataset` meets the same, and says what it is
+    if read.attrs.get("format") != FORMAT or DIGESTS not in read.attrs:
+        return None
+    if changed_attributes(read.attrs) or changed_variables(read):
+        return None
+    return FlightData(read.variables, read.coordinates, {k: v for k, v in read.attrs.items() if k != DIGESTS})
 
 
 def _dataset(path: Path) -> xr.Dataset:

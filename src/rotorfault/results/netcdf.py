@@ -21,6 +21,12 @@ from rotorfault.results.flight_data import FlightData, Variable
 COMPRESSION = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 """Of signals. A higher level takes many times longer for a few percent."""
 
+_SCALE = b"DIMENSION_SCALE"
+_OWN = {
+    "CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_FillValue", "_NCProperties", "_Netcdf4Coordinates",
+    "_Netcdf4Dimid",
+}  # fmt: skip
+
 
 def write_netcdf(data: FlightData, path: Path) -> None:
     """Write a flight, compressed, whole or not at all.
@@ -52,6 +58,38 @@ def encoded(data: FlightData) -> io.BytesIO:
         properties = f"version=2,hdf5={h5py.version.hdf5_version},h5py={h5py.__version__}"
         file.attrs["_NCProperties"] = np.array(properties, dtype=h5py.string_dtype("ascii", len(properties)))
     return memory
+
+
+def plain_arrays(file: h5py.File) -> FlightData:
+    """What `encoded` wrote, read back; of a file of others it may be wrong, or raise whatever h5py does.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Open for reading.
+    """
+    names = {int(one.attrs["_Netcdf4Dimid"]): name for name, one in file.items() if one.attrs.get("CLASS") == _SCALE}
+    read = {}
+    for name, one in file.items():
+        about = dict(one.attrs)
+        dims = tuple(names[int(i)] for i in about["_Netcdf4Coordinates"])
+        values = one.asstr()[()].astype(str) if one.dtype.kind == "O" else one[()]
+        read[name] = Variable(dims, values, _said(about))
+    scales = set(names.values())
+    return FlightData(
+        {name: one for name, one in read.items() if name not in scales},
+        {name: one for name, one in read.items() if name in scales},
+        _said(dict(file.attrs)),
+    )
+
+
+def _said(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of the flight, without those that HDF5 and NetCDF have for themselves."""
+    return {
+        name: value if isinstance(value, str) or np.size(value) != 1 else np.ravel(value)[0]
+        for name, value in attributes.items()
+        if name not in _OWN
+    }
 
 
 def _add(file: Any, name: str, variable: Variable, number: dict[str, int], options: dict[str, Any]) -> Any:
