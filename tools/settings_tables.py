@@ -23,9 +23,10 @@ from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.frames import FRAMES
+from rotorfault.model.quantities import AirFile, Rotor
 from rotorfault.model.slot import Slot, telemetry_of
 from rotorfault.model.telemetry import RPY, Signal, signals_of
-from rotorfault.model.vehicle_file import Rotor, VehicleFile, load_vehicle, vehicle_names
+from rotorfault.model.vehicle_file import VehicleFile, load_vehicle, vehicle_names
 from rotorfault.scenario.part import DEFAULT_PRESET, NO_PRESET
 from rotorfault.scenario.setting_rows import Setting, inner_model, scenario_settings, settings, toml_value
 from rotorfault.scenario.slots import SLOTS
@@ -33,6 +34,7 @@ from rotorfault.studies.paper import range_tables, ranges
 from rotorfault.tuning.objectives import OBJECTIVES, WEIGHTS
 
 DOCS = Path(__file__).parents[1] / "docs"
+AIR_UNITS = ("kg/rad", "kg/m", "kg m/rad", "N m s", "N m s^2")
 BLOCK = re.compile(r"(<!-- table: (\S+) -->\n)(.*?)(<!-- end of table -->)", re.DOTALL)
 __all__ = ["BLOCK", "DOCS", "Setting", "part_settings", "settings", "tables", "updated"]
 
@@ -92,7 +94,7 @@ def _vehicle_table() -> str:
     units = {key: quantity.unit for key, quantity in load_vehicle("paper").quantities()}
     rows = []
     for name, field in VehicleFile.model_fields.items():
-        if name == "rotor":
+        if name in ("rotor", "air"):
             continue
         unit = units.get(name, "")
         # Of a quantity the number alone, in the unit beside it.
@@ -105,6 +107,11 @@ def _vehicle_table() -> str:
         default = "required" if field.is_required() else toml_value(field.default)
         text = (field.description or "").removesuffix(f", {unit}")
         rows.append([f"`rotor.{name}`", default, unit, text])
+    for name, field in AirFile.model_fields.items():
+        unit, _, text = (field.description or "").partition(", ")
+        # "the same for yaw" is in the unit of the row before it.
+        unit, text = (unit, text) if any(unit == one for one in AIR_UNITS) else (rows[-1][2], field.description or "")
+        rows.append([f"`air.{name}`", "0", unit, text])
     return _markdown(["key", "default", "unit", "meaning"], rows)
 
 

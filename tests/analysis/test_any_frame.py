@@ -10,7 +10,8 @@ import pytest
 from allocation_cases import PAPER
 from hover_cases import random_case
 
-from rotorfault.analysis.hover import attainable, critical_loss, hover_margin, torque_reserve
+from rotorfault.analysis.attainable import attainable
+from rotorfault.analysis.hover import critical_loss, hover_margin, torque_reserve
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import flatten
 from rotorfault.model.vehicle import Vehicle

@@ -38,7 +38,6 @@ from rotorfault.analysis import any_frame
 from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
-from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import (
@@ -82,17 +81,6 @@ class HoverMargin(NamedTuple):
 
     def __repr__(self) -> str:
         return record_line(self)
-
-
-class Attainable(NamedTuple):
-    """What hover in still air is possible with given losses; `TrimReport.attainable`."""
-
-    loss: PerRotor
-    margin: HoverMargin
-    reserve_with_yaw: Vec3  # N m about the body axes
-    reserve_without_yaw: Vec3  # N m, z is 0
-    critical_with_yaw: PerRotor  # largest loss of each rotor, the others as they are; NaN if there is none
-    critical_without_yaw: PerRotor
 
 
 def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -> HoverMargin:
@@ -261,7 +249,7 @@ def critical_pair(
     if _index(rotor_a, vehicle) == _index(rotor_b, vehicle):
         raise InputError(f"rotor_b: got {rotor_b}, which is rotor_a; allowed: another one of 1 to {vehicle.rotors}")
     losses = np.asarray(losses_a, dtype=float)
-    loss = PerRotor.of(losses if i == rotor_a else np.zeros_like(losses) for i in _numbers(vehicle))
+    loss = PerRotor.of(losses if i == rotor_a else np.zeros_like(losses) for i in numbers_of(vehicle))
     return np.asarray(critical_loss(vehicle, rotor_b, yaw, wind_W, loss), dtype=float)
 
 
@@ -309,72 +297,6 @@ def torque_reserve(vehicle: Vehicle, loss: PerRotor, yaw: bool = True, wind_W: V
     pairs = (2.0 * minimum(spare.r1, spare.r2), 2.0 * minimum(spare.r3, spare.r4))
     tilt = [upright * minimum(*_reaches(pairs, arms, arms)) for arms in (roll, pitch)]
     return Vec3(tilt[0], tilt[1], upright * maximum(4.0 * spare.reduce(minimum) * vehicle.torque_ratio, 0.0))
-
-
-def attainable(vehicle: Vehicle, loss: PerRotor | None = None) -> Attainable:
-    """What hover in still air losses leave, and which further loss of a rotor would end it.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    loss : PerRotor, optional
-        Of each rotor, 0 to 1; all sound if not given.
-
-    Returns
-    -------
-    Attainable
-    """
-    loss = PerRotor.all(0.0, vehicle.rotors) if loss is None else loss
-    with_yaw, without_yaw = (
-        PerRotor.of(critical_loss(vehicle, rotor, yaw, loss=loss) for rotor in _numbers(vehicle))
-        for yaw in (True, False)
-    )
-    return Attainable(
-        loss=loss,
-        margin=hover_margin(vehicle, loss),
-        reserve_with_yaw=torque_reserve(vehicle, loss),
-        reserve_without_yaw=torque_reserve(vehicle, loss, yaw=False),
-        critical_with_yaw=with_yaw,
-        critical_without_yaw=without_yaw,
-    )
-
-
-def attainable_lines(report: Attainable, vehicle: Vehicle) -> list[str]:
-    """The same as text, within 100 columns.
-
-    Parameters
-    ----------
-    report : Attainable
-    vehicle : Vehicle
-        The one that the report is about.
-
-    Returns
-    -------
-    list of str
-    """
-    m = report.margin
-    lost = [f"rotor {i} lost {x:g}" for i, x in enumerate(report.loss, start=1) if x > 0.0]
-    kinds = [("", "possible", "largest thrust [N]", "torque in reserve about roll, pitch, yaw [N m]")]
-    for name, possible, most, reserve in (
-        ("yaw held", m.with_yaw, m.thrust_with_yaw, list(report.reserve_with_yaw)),
-        ("yaw given up", m.without_yaw, m.thrust_without_yaw, list(report.reserve_without_yaw)[:2]),
-    ):
-        torque = ", ".join(f"{t:.3g}" for t in reserve) if possible else "-"
-        kinds.append((name, "yes" if possible else "no", _thrust(most), torque))
-    enough = "enough thrust on average, which is all that is known" if m.spinning else "-"
-    kinds.append(("spinning", "perhaps" if m.spinning else "no", _thrust(m.thrust_spinning), enough))
-    numbers = [str(number) for number in _numbers(vehicle)]
-    critical: list[tuple[str, ...]] = [("largest loss of one rotor, the others as they are", *numbers)]
-    for name, losses in (("yaw held", report.critical_with_yaw), ("yaw given up", report.critical_without_yaw)):
-        critical.append((name, *("none" if math.isnan(x) else f"{x:.4f}" for x in losses)))
-    turn = f"which turns the body faster by {m.yaw_torque / vehicle.inertia.z:.3g} rad/s^2"
-    left_over = [f"  yaw torque left over  {m.yaw_torque:.3g} N m, {turn}"]
-    return [
-        f"Attainable hover in still air, {', '.join(lost) or 'rotors sound'} (thrust needed {m.needed:.4g} N)",
-        *table_lines(kinds, "<<><", indent=2),
-        *(left_over if m.without_yaw and not m.with_yaw else []),
-        *table_lines(critical, "<" + ">" * len(numbers), indent=2),
-    ]
 
 
 def _most_tilt_yaw_free(low: PerRotor, high: PerRotor, needed: Scalar, alpha: Scalar, beta: Scalar) -> Scalar:
@@ -439,9 +361,6 @@ def _index(rotor: int, vehicle: Vehicle) -> int:
     return whole_number(rotor, "rotor", 1, vehicle.rotors) - 1
 
 
-def _numbers(vehicle: Vehicle) -> range:
+def numbers_of(vehicle: Vehicle) -> range:
+    """Numbers of its rotors."""
     return range(1, vehicle.rotors + 1)
-
-
-def _thrust(most: float) -> str:
-    return f"{most:.4g}" if most > -math.inf else "no balance"

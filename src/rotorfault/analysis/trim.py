@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.analysis.hover import Attainable, attainable, attainable_lines
+from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
 from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings

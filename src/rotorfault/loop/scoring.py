@@ -105,8 +105,7 @@ class Scoring:
         signals: tuple[Signal, ...] = (),
         rotors: int = 4,
     ) -> None:
-        self.count_of_rotors = rotors
-        self.ground, self.lands, self.faulty = ground, lands, faulty
+        self.ground, self.lands, self.faulty, self.count_of_rotors = ground, lands, faulty, rotors
         self.rotors = tuple(sorted(set(faulty)))
         self.counted = tuple(signal for signal in signals if signal.quantity.score is not None)
         self.has_cost = any(signal.name == COST_INPUT for signal in signals)
@@ -114,8 +113,7 @@ class Scoring:
 
     def initial(self) -> Scores:
         """Nothing counted."""
-        none, never = zeros(), Vec3(-1.0, -1.0, -1.0)
-        each_rotor = PerRotor.all(0.0, self.count_of_rotors)
+        none, never, each_rotor = zeros(), Vec3(-1.0, -1.0, -1.0), PerRotor.all(0.0, self.count_of_rotors)
         landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0) if self.lands else ()
         return Scores(
             over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,

@@ -16,10 +16,10 @@ Units are the SI units of `rotorfault.model.vehicle.Vehicle` alone, so that no n
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
@@ -32,104 +32,19 @@ from rotorfault.base.one_line import cut
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.quantities import (
+    AirFile,
+    Inertia,
+    Quantity,
+    Rotor,
+    Thrust,
+    in_unit,
+    not_negative,
+    positive,
+)
 from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle, opposite_pairs
 
 LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
-
-
-class Quantity(Strict):
-    """A number with its unit and where it comes from."""
-
-    value: float = Field(description="the number, in `unit`")
-    unit: str = Field(description="SI unit")
-    source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
-
-
-def _in(unit: str, rule: Callable[[float], bool] | None = None, allowed: str = "") -> AfterValidator:
-    """Check that a quantity comes in this unit and its value within the allowed range."""
-
-    def check(quantity: Quantity) -> Quantity:
-        if quantity.unit != unit:
-            raise refusal("unit", f"got '{quantity.unit}'; allowed: '{unit}'; convert the value to it")
-        if rule is not None and not rule(quantity.value):
-            raise refusal("value", f"got {quantity.value!r} {unit}; allowed: {allowed}")
-        return quantity
-
-    return AfterValidator(check)
-
-
-def _positive(unit: str) -> AfterValidator:
-    return _in(unit, lambda value: value > 0.0, "greater than 0")
-
-
-def _not_negative(unit: str) -> AfterValidator:
-    return _in(unit, lambda value: value >= 0.0, "0 or greater")
-
-
-Inertia = Annotated[Quantity, _positive("kg m^2")]
-Length = Annotated[Quantity, _in("m")]
-Thrust = Annotated[Quantity, _not_negative("N")]
-
-
-class Rotor(Strict):
-    """Where one rotor sits and which way its drag torque turns the body."""
-
-    x: Length = Field(description="forward of the centre of mass, m")
-    y: Length = Field(description="left of the centre of mass, m")
-    yaw: Literal["+", "-"] = Field(description="'+' if its drag torque turns the body towards positive yaw")
-    z: Length | None = Field(default=None, description="above the centre of mass, m; 0 if not given")
-    name: str = Field(default="", description="the vendor's name of the rotor")
-
-
-class AirFile(Strict):
-    """What the air does beyond linear drag; all 0 if not given. See `rotorfault.model.aerodynamics`."""
-
-    rotor_drag: Annotated[Quantity, _not_negative("kg/rad")] | None = Field(
-        default=None, description="kg/rad, force across a rotor's axis per rotor speed and airspeed"
-    )
-    inflow: Annotated[Quantity, _not_negative("kg/rad")] | None = Field(
-        default=None, description="kg/rad, thrust lost per rotor speed and speed along the axis"
-    )
-    translational_lift: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
-        default=None, description="kg/m, thrust won per squared airspeed across the axis"
-    )
-    flapping: Annotated[Quantity, _not_negative("kg m/rad")] | None = Field(
-        default=None, description="kg m/rad, moment of the blades per rotor speed and airspeed across the axis"
-    )
-    frame_drag_x: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
-        default=None, description="kg/m, force of the frame per squared airspeed, forward"
-    )
-    frame_drag_y: Annotated[Quantity, _not_negative("kg/m")] | None = Field(
-        default=None, description="the same, left"
-    )
-    frame_drag_z: Annotated[Quantity, _not_negative("kg/m")] | None = Field(default=None, description="the same, up")
-    damping_roll: Annotated[Quantity, _not_negative("N m s")] | None = Field(
-        default=None, description="N m s, torque against a roll rate"
-    )
-    damping_pitch: Annotated[Quantity, _not_negative("N m s")] | None = Field(
-        default=None, description="the same for pitch"
-    )
-    damping_yaw: Annotated[Quantity, _not_negative("N m s")] | None = Field(
-        default=None, description="the same for yaw"
-    )
-    damping_squared_roll: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
-        default=None, description="N m s^2, torque against a squared roll rate"
-    )
-    damping_squared_pitch: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
-        default=None, description="the same for pitch"
-    )
-    damping_squared_yaw: Annotated[Quantity, _not_negative("N m s^2")] | None = Field(
-        default=None, description="the same for yaw"
-    )
-
-    def number(self, key: str) -> float:
-        """A coefficient, 0 where it is not given."""
-        quantity: Quantity | None = getattr(self, key)
-        return 0.0 if quantity is None else quantity.value
-
-    def along(self, key: str, names: tuple[str, str, str]) -> Vec3:
-        """Three coefficients, by the ends of their keys."""
-        return Vec3(*(self.number(f"{key}_{name}") for name in names))
 
 
 class VehicleFile(Strict):
@@ -137,23 +52,23 @@ class VehicleFile(Strict):
 
     name: str = Field(min_length=1, description="short name, as used in scenarios")
     description: str = Field(default="", description="one line")
-    mass: Annotated[Quantity, _positive("kg")] = Field(description="kg, with battery")
+    mass: Annotated[Quantity, positive("kg")] = Field(description="kg, with battery")
     inertia_x: Inertia = Field(description="kg m^2, principal moment about the forward axis")
     inertia_y: Inertia = Field(description="kg m^2, principal moment about the left axis")
     inertia_z: Inertia = Field(description="kg m^2, principal moment about the upward axis")
-    rotor_inertia: Annotated[Quantity, _not_negative("kg m^2")] = Field(description="kg m^2, one rotor on its axis")
-    thrust_coefficient: Annotated[Quantity, _positive("N/(rad/s)^2")] = Field(
+    rotor_inertia: Annotated[Quantity, not_negative("kg m^2")] = Field(description="kg m^2, one rotor on its axis")
+    thrust_coefficient: Annotated[Quantity, positive("N/(rad/s)^2")] = Field(
         description="N/(rad/s)^2, thrust per squared rotor speed"
     )
-    torque_ratio: Annotated[Quantity, _positive("m")] = Field(description="m, drag torque over thrust (kappa)")
+    torque_ratio: Annotated[Quantity, positive("m")] = Field(description="m, drag torque over thrust (kappa)")
     thrust_min: Thrust = Field(description="N, least thrust of a rotor")
     thrust_max: Thrust = Field(description="N, greatest thrust of a rotor")
-    rotor_bandwidth: Annotated[Quantity, _positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
-    rotor_gain: Annotated[Quantity, _positive("1")] = Field(description="thrust per commanded thrust (k)")
-    linear_drag: Annotated[Quantity, _not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
-    gravity: Annotated[Quantity, _positive("m/s^2")] = Field(description="m/s^2")
+    rotor_bandwidth: Annotated[Quantity, positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
+    rotor_gain: Annotated[Quantity, positive("1")] = Field(description="thrust per commanded thrust (k)")
+    linear_drag: Annotated[Quantity, not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
+    gravity: Annotated[Quantity, positive("m/s^2")] = Field(description="m/s^2")
     rotor_reaction: Annotated[
-        Quantity, _in("1", lambda value: 0.0 <= value <= 1.0, "0 (without) to 1 (as it is)")
+        Quantity, in_unit("1", lambda value: 0.0 <= value <= 1.0, "0 (without) to 1 (as it is)")
     ] = Field(
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",

@@ -63,7 +63,7 @@ class Effect(NamedTuple):
 
 
 class OneRotor(Strict):
-    """What every fault has: the rotor that it hits."""
+    """The rotor that a fault hits."""
 
     rotor: int = Field(ge=1, le=MOST_ROTORS, description="number of the rotor, from 1")
 
@@ -116,7 +116,7 @@ FAULT = Slot(
 
 
 def since(time: Scalar, start: Scalar) -> Scalar:
-    """1 from `start` on, robust against rounding of the time; both in s."""
+    """1 from `start` on, robust against rounding; both in s."""
     return greater_equal(time, start - TIME_TOLERANCE)
 
 
@@ -133,8 +133,7 @@ def rotor_faults(
     Parameters
     ----------
     faults : sequence of Fault
-    memories, parameters : sequence of records
-        One for each fault.
+    memories, parameters : sequence of records, one for each
     time : scalar, s
         Since the start of the flight.
     dt : scalar, s, optional
@@ -145,12 +144,10 @@ def rotor_faults(
     Returns
     -------
     RotorFault
-        Remaining effectiveness is a product; of several stuck faults of one rotor that are active, the last listed
-        holds.
+        Remaining effectiveness is a product; of stuck faults of one rotor that are active, the last listed holds.
     """
     effectiveness: list[Scalar] = [1.0] * rotors
-    stuck: list[Scalar] = [0.0] * rotors
-    thrust: list[Scalar] = [0.0] * rotors
+    stuck, thrust = ([0.0] * rotors for _ in range(2))
     for fault, memory, numbers in zip(faults, memories, parameters, strict=True):
         i = fault.rotor - 1
         effect = fault.at(time, memory, numbers) if dt is None else fault.over(time, dt, memory, numbers)
