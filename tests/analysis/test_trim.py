@@ -21,7 +21,7 @@ from rotorfault.cli.losses import parse_losses
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.signals import Command, Estimate, Reference, Wrench
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Opposite, Vehicle, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.scenario.library import load_scenario
 
@@ -199,7 +199,12 @@ def test_trim_warns_of_a_vehicle_by_its_numbers_alone(name: str) -> None:
     vehicle = load_vehicle(name).vehicle
     assert not [line for line in trim_report(vehicle, "smc").warnings if "hover leaves" in line]
     y = 2.0 * vehicle.inertia.x / (vehicle.mass * vehicle.gravity)  # turns the vehicle with 2 rad/s^2
-    thin = vehicle._replace(rotor_x=PerRotor(0.22, -0.22, 0.22, -0.22), rotor_y=PerRotor(y, -y, -y, y))
+    thin = vehicle._replace(
+        rotor_x=PerRotor(0.22, -0.22, 0.22, -0.22),
+        rotor_y=PerRotor(y, -y, -y, y),
+        rotor_yaw_sign=PerRotor(1.0, 1.0, -1.0, -1.0),
+        pairs=Opposite((0, 1, 2, 3)),
+    )
     (line,) = [line for line in trim_report(thin, "smc").warnings if line.startswith("roll: hover leaves")]
     assert f"{hover(thin).torque_max.x / thin.inertia.x:.3g} rad/s^2 (lever {1e3 * y:.3g} mm" in line
 
