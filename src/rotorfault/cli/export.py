@@ -19,7 +19,8 @@ def export(
     flight: Annotated[
         Path,
         typer.Argument(
-            metavar="FLIGHT.nc", help="A flight file that 'rotorfault fly' wrote; or the word 'vehicle', then a vehicle."
+            metavar="FLIGHT.nc",
+            help="A flight file that 'rotorfault fly' wrote; or the word 'vehicle', then a vehicle.",
         ),
     ],
     vehicle: Annotated[

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from rotorfault.model.importers.draft import Given
 
 
-
 @app.command()
 def new(
     what: Annotated[str, typer.Argument(metavar="vehicle|scenario|study", help="What to write.")],
@@ -124,7 +123,7 @@ def _refuse_without_source(given: Given, estimate: bool, allow_code: bool) -> No
     names = [f"--{key.replace('_', '-')}" for key, value in given._asdict().items() if value is not None]
     names += ["--estimate"] * estimate + ["--allow-code"] * allow_code
     if names:
-        raise InputError(f"{', '.join(names)}: allowed: with --from FORMAT SOURCE; a template is changed by editing it")
+        raise InputError(f"{', '.join(names)}: allowed: with --from FORMAT SOURCE; edit a template instead")
 
 
 def _inertia(text: str) -> tuple[float, float, float]:

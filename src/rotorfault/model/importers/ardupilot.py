@@ -123,12 +123,12 @@ def _shares(params: Params) -> tuple[tuple[float, str] | None, tuple[float, str]
 
     named = [name for name in ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX") if params.has(name)]
     through = f" through {', '.join(named)}" if named else ""
-    low = (thrust(least) / thrust(most), f"{params.where}: MOT_SPIN_MIN{through}") if least > 0.0 else None
+    lowest = (thrust(least) / thrust(most), f"{params.where}: MOT_SPIN_MIN{through}") if least > 0.0 else None
     if not params.has("MOT_THST_HOVER"):
-        return None, low
+        return None, lowest
     asked = params.number("MOT_THST_HOVER")
     # The signal in its range that the curve turns into this thrust.
     root = math.sqrt((1.0 - expo) ** 2 + 4.0 * expo * asked)
     signal = 2.0 * asked / (1.0 - expo + root)
     share = thrust(least + (most - least) * signal) / thrust(most)
-    return (share, f"{params.where}: MOT_THST_HOVER{through}"), low
+    return (share, f"{params.where}: MOT_THST_HOVER{through}"), lowest

@@ -65,7 +65,7 @@ def motors_of(plugins: Iterable[ET.Element], where: str) -> list[Motor]:
     InputError
         If there is none, or one does not say where it is and how it turns.
     """
-    found = []
+    found: list[Motor] = []
     for plugin in plugins:
         link = text_of(plugin, "linkName")
         if link is None or text_of(plugin, "motorConstant") is None:

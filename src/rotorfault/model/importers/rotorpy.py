@@ -164,9 +164,13 @@ def _of_numpy(node: ast.expr) -> str:
 def _calculated(operation: Any, node: ast.expr, operands: Sequence[object]) -> Any:
     """An operation on numbers and arrays of them; nothing that grows, such as a text times a number."""
     try:
-        arrays = [np.asarray(operand, dtype=float) for operand in operands]
+        arrays = [np.asarray(operand) for operand in operands]
+        # A list times 3 is three lists to Python, and a text is no number to it.
+        lists = any(isinstance(operand, list) for operand in operands) and isinstance(node, (ast.BinOp, ast.UnaryOp))
+        if lists or any(array.dtype.kind not in "iuf" for array in arrays):
+            raise TypeError
         with np.errstate(all="ignore"):
-            result = operation(*arrays)
+            result = operation(*(array.astype(float) for array in arrays))
     except (TypeError, ValueError) as error:
         raise NotReadError(f"line {node.lineno} cannot be calculated ({type(error).__name__})") from None
     if result.size > 10_000:
@@ -189,7 +193,7 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
         raise InputError(f"{where}: rotor_directions is {signs}; allowed: 1 and -1")
     rotors = tuple(
         SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level)
-        for name, (x, y, _), sign, level in zip(positions, places, signs, levels(map(tuple, places)), strict=True)
+        for name, (x, y, _), sign, level in zip(positions, places, signs, levels((x, y, z) for x, y, z in places), strict=True)
     )  # fmt: skip
     known: dict[str, Quantity] = {}
 
