@@ -164,3 +164,26 @@ def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path) -> None:
         rf.import_vehicle("px5", path, "mine")
     with pytest.raises(InputError, match="format of vehicles"):
         rf.export_vehicle("x500", "sdf")
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"mass": True}, "mass: got True; allowed: a finite number, greater than 0, in kg"),
+        ({"mass": "2"}, "mass: got '2'"),
+        ({"mass": float("inf")}, "mass: got inf"),
+        ({"mass": 1.0, "linear_drag": -0.1}, "linear_drag: got -0.1; allowed: a finite number, 0 or more, in N s/m"),
+        ({"mass": 1.0, "inertia": (0.01, 0.01)}, "inertia: got (0.01, 0.01); allowed: three finite numbers"),
+        ({"mass": 1.0, "inertia": 0.01}, "inertia: got 0.01; allowed: three finite numbers"),
+    ],
+)
+def test_numbers_that_are_given_are_numbers_of_a_vehicle(given: dict[str, object], told: str, tmp_path: Path) -> None:
+    path = write(tmp_path, f"#!/bin/sh\n{GEOMETRY}")
+    with pytest.raises(InputError, match="allowed") as refused:
+        rf.import_vehicle("px4", path, "mine", estimate=True, **given)  # type: ignore[arg-type]
+    assert told in str(refused.value)
+
+
+def test_rotors_at_one_place_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="all rotors are at one place"):
+        rf.import_vehicle("px4", write(tmp_path, "CA_ROTOR_COUNT 4\n"), "mine", mass=1.0, estimate=True)

@@ -11,9 +11,11 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from pydantic_core import PydanticCustomError
+
 from rotorfault.base.config import parse_toml, validate
-from rotorfault.base.errors import InputError
-from rotorfault.base.number_rule import plain_number
+from rotorfault.base.errors import InputError, short
+from rotorfault.base.number_rule import plain_number, real
 from rotorfault.model.frames import REFERENCE, Frame, Motor, place_of
 from rotorfault.model.importers.estimates import Known, estimate_of
 from rotorfault.model.vehicle_file import Quantity, VehicleFile
@@ -126,7 +128,14 @@ def quantity(key: str, value: float, source: str) -> Quantity:
     value : float
         In the unit of the key.
     source : str
+
+    Raises
+    ------
+    InputError
+        If it is not finite.
     """
+    if not math.isfinite(value):
+        raise InputError(f"{source}: {key} is {value}; allowed: a finite number")
     return Quantity(value=value, unit=UNITS[key], source=source)
 
 
@@ -148,6 +157,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
     InputError
         If numbers are missing, or the vehicle is none that can fly.
     """
+    given = _checked(given)
     numbers = _with_given(draft, given)
     if "thrust_max" not in numbers and draft.hover_share is not None and "mass" in numbers:
         numbers["thrust_max"] = _thrust_of_hover(draft, numbers["mass"].value)
@@ -159,7 +169,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
     rotors = _rotors(draft, given)
     estimated = [key for key in missing if key in UNITS]
     for key in sorted(estimated, key=_FIRST.index):
-        numbers[key] = quantity(key, *estimate_of(key, _known(numbers, rotors)))
+        numbers[key] = quantity(key, *estimate_of(key, _known(numbers, rotors, draft.where)))
     if "thrust_min" not in numbers:
         share, source = draft.least_share or (0.0, "our choice: rotors may stop")
         numbers["thrust_min"] = quantity("thrust_min", _digits(share * numbers["thrust_max"].value), source)
@@ -251,6 +261,40 @@ _FIRST = [
 ]
 
 
+def _checked(given: Given) -> Given:
+    """The numbers of the user as floats, each of which can be one of a vehicle."""
+    found: dict[str, float] = {}
+    for key, value in given._asdict().items():
+        if value is None:
+            continue
+        parts = value if key == "inertia" and isinstance(value, (tuple, list)) else (value,)
+        numbers = [real_or_nan(part) for part in parts]
+        low = "0 or more" if key in ("thrust_min", "rotor_inertia", "linear_drag") else "greater than 0"
+        good = all(number > 0.0 or (number == 0.0 and low == "0 or more") for number in numbers)
+        if not good or len(numbers) != (3 if key == "inertia" else 1):
+            what = "three finite numbers" if key == "inertia" else "a finite number"
+            raise InputError(f"{key}: got {short(value)}; allowed: {what}, {low}, in {_UNIT_OF[key]}")
+        found[key] = tuple(numbers) if key == "inertia" else numbers[0]  # type: ignore[assignment]
+    return Given(**found)  # type: ignore[arg-type]
+
+
+def real_or_nan(value: object) -> float:
+    """A number as a finite float; NaN if it is none.
+
+    Parameters
+    ----------
+    value : object
+    """
+    try:
+        number = real(value)
+    except PydanticCustomError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan
+
+
+_UNIT_OF = {**UNITS, "inertia": "kg m^2", "arm": "m"}
+
+
 def _with_given(draft: Draft, given: Given) -> dict[str, Quantity]:
     """The numbers of a draft, and those of the user instead of them."""
     numbers = {**ALWAYS, **draft.known}
@@ -298,9 +342,14 @@ def _rotors(draft: Draft, given: Given) -> tuple[SourceRotor, ...]:
     )
 
 
-def _known(numbers: Mapping[str, Quantity], rotors: tuple[SourceRotor, ...]) -> Known:
+def _known(numbers: Mapping[str, Quantity], rotors: tuple[SourceRotor, ...], where: str) -> Known:
     """What estimates are made of."""
     thrust = numbers.get("thrust_coefficient")
+    for key in ("mass", "thrust_coefficient"):
+        if key in numbers and not numbers[key].value > 0.0:
+            raise InputError(f"{where}: {key} is {numbers[key].value:g}; allowed: greater than 0")
+    if len({(round(rotor.x, 4), round(rotor.y, 4)) for rotor in rotors}) < 2:
+        raise InputError(f"{where}: all rotors are at one place; allowed: rotors about the centre of mass")
     return Known(
         mass=numbers["mass"].value,
         gravity=numbers["gravity"].value,

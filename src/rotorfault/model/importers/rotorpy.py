@@ -20,13 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic_core import PydanticCustomError
 
 from rotorfault.base import foreign
 from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError
-from rotorfault.base.number_rule import real
-from rotorfault.model.importers.draft import GRAVITY, Draft, SourceRotor, levels, quantity
+from rotorfault.model.importers.draft import GRAVITY, Draft, SourceRotor, levels, quantity, real_or_nan
 from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.model.vehicle_file import Quantity
 
@@ -191,10 +189,11 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
     signs = _vector(directions, "rotor_directions", where, len(places))
     if any(abs(sign) != 1.0 for sign in signs):
         raise InputError(f"{where}: rotor_directions is {signs}; allowed: 1 and -1")
+    heights = levels((x, y, z) for x, y, z in places)
     rotors = tuple(
         SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level)
-        for name, (x, y, _), sign, level in zip(positions, places, signs, levels((x, y, z) for x, y, z in places), strict=True)
-    )  # fmt: skip
+        for name, (x, y, _), sign, level in zip(positions, places, signs, heights, strict=True)
+    )
     known: dict[str, Quantity] = {}
 
     def take(key: str, name: str, how: str = "", value: float | None = None) -> float | None:
@@ -239,11 +238,8 @@ def _number(found: Mapping[Any, Any], name: str, where: str) -> float | None:
 
 
 def _real(value: object, name: str, where: str) -> float:
-    try:
-        number = real(value)
-    except PydanticCustomError:
-        number = math.nan
-    if not math.isfinite(number):
+    number = real_or_nan(value)
+    if math.isnan(number):
         raise InputError(f"{where}: {name} is {str(value)[:40]}; allowed: a finite number")
     return number
 
