@@ -11,7 +11,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.cli.app import app, say
 
 if TYPE_CHECKING:
-    from rotorfault.model.importers.draft import Given
+    from rotorfault.model.importers.numbers import Given
 
 
 @app.command()
@@ -64,7 +64,7 @@ def new(
     Example: rotorfault new vehicle mine --from ardupilot mine.param --mass 2.1 --arm 0.27 --estimate
     """
     from rotorfault.cli import catalogue
-    from rotorfault.model.importers.draft import Given
+    from rotorfault.model.importers.numbers import Given
 
     given = Given(
         mass,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rotorfault.base.text_table import table_lines
 from rotorfault.cli.frame_drawing import drawing_lines
-from rotorfault.model.frames import place_of
-from rotorfault.model.importers.draft import layout
+from rotorfault.model.frames import REFERENCE, Frame, Motor, place_of
 from rotorfault.model.vehicle_file import VehicleFile
 
 
@@ -26,8 +26,10 @@ def layout_lines(vehicle: VehicleFile, theirs: Sequence[str], form: str, levels:
     """
     rotors = vehicle.rotor
     known = list(levels) or [""] * len(rotors)
-    frame = layout(
-        vehicle.name, [(r.x.value, r.y.value, r.yaw == "+", level) for r, level in zip(rotors, known, strict=True)]
+    arm = max(math.hypot(rotor.x.value, rotor.y.value) for rotor in rotors)
+    motors = tuple(
+        Motor(number, rotor.x.value / arm, rotor.y.value / arm, rotor.yaw == "+", level)
+        for number, (rotor, level) in enumerate(zip(rotors, known, strict=True), start=1)
     )
     rows = [["rotor", form, "where", "x [m]", "y [m]", "turns", "yaw"]]
     for number, (rotor, their, level) in enumerate(zip(rotors, theirs, known, strict=True), start=1):
@@ -36,4 +38,10 @@ def layout_lines(vehicle: VehicleFile, theirs: Sequence[str], form: str, levels:
         where = ", ".join(filter(None, (place, level)))
         rows.append([str(number), their, where, f"{rotor.x.value:.4f}", f"{rotor.y.value:.4f}", turns, rotor.yaw])
     legend = f"numbers of rotorfault, seen from above; '{form}' is the number that it has there"
-    return [*drawing_lines(frame), "", *table_lines(rows, ">><>><<", indent=2, rule=True), "", legend]
+    return [
+        *drawing_lines(Frame(vehicle.name, (), motors, REFERENCE)),
+        "",
+        *table_lines(rows, ">><>><<", indent=2, rule=True),
+        "",
+        legend,
+    ]

@@ -11,35 +11,14 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from pydantic_core import PydanticCustomError
-
 from rotorfault.base.config import parse_toml, validate
-from rotorfault.base.errors import InputError, short
-from rotorfault.base.number_rule import plain_number, real
-from rotorfault.model.frames import REFERENCE, Frame, Motor, place_of
+from rotorfault.base.errors import InputError
+from rotorfault.model.frames import Frame, place_of
 from rotorfault.model.importers.estimates import Known, estimate_of
+from rotorfault.model.importers.numbers import GRAVITY, UNITS, Given, checked, quantity
 from rotorfault.model.vehicle_file import Quantity, VehicleFile
 from rotorfault.model.vehicle_text import vehicle_text
 
-UNITS = {
-    "mass": "kg",
-    "inertia_x": "kg m^2",
-    "inertia_y": "kg m^2",
-    "inertia_z": "kg m^2",
-    "rotor_inertia": "kg m^2",
-    "thrust_coefficient": "N/(rad/s)^2",
-    "torque_ratio": "m",
-    "thrust_min": "N",
-    "thrust_max": "N",
-    "rotor_bandwidth": "rad/s",
-    "rotor_gain": "1",
-    "linear_drag": "N s/m",
-    "gravity": "m/s^2",
-    "rotor_reaction": "1",
-}
-"""Numbers of a vehicle in the order of its file, with their units."""
-
-GRAVITY = 9.81
 ALWAYS = {
     "rotor_gain": Quantity(value=1.0, unit="1", source="our choice: commands are thrusts"),
     "gravity": Quantity(value=GRAVITY, unit="m/s^2", source="standard gravity, rounded"),
@@ -93,21 +72,6 @@ class Draft(NamedTuple):
     notes: tuple[str, ...] = ()  # what of the source is left out, a line each
 
 
-class Given(NamedTuple):
-    """Numbers that the user gives, SI units; None where not."""
-
-    mass: float | None = None  # kg
-    inertia: tuple[float, float, float] | None = None  # kg m^2, about forward, left and upward axis
-    arm: float | None = None  # m, the longest
-    rotor_inertia: float | None = None  # kg m^2
-    thrust_coefficient: float | None = None  # N/(rad/s)^2
-    torque_ratio: float | None = None  # m
-    thrust_min: float | None = None  # N
-    thrust_max: float | None = None  # N
-    rotor_bandwidth: float | None = None  # rad/s
-    linear_drag: float | None = None  # N s/m
-
-
 class Imported(NamedTuple):
     """A vehicle that was made of a source."""
 
@@ -116,27 +80,6 @@ class Imported(NamedTuple):
     rotors: tuple[SourceRotor, ...]  # in the order of the file
     notes: tuple[str, ...]  # what was left out, a line each
     estimated: tuple[str, ...]  # keys whose numbers are estimates
-
-
-def quantity(key: str, value: float, source: str) -> Quantity:
-    """A number of the vehicle file with the unit of its key.
-
-    Parameters
-    ----------
-    key : str
-        Such as ``"mass"``.
-    value : float
-        In the unit of the key.
-    source : str
-
-    Raises
-    ------
-    InputError
-        If it is not finite.
-    """
-    if not math.isfinite(value):
-        raise InputError(f"{source}: {key} is {value}; allowed: a finite number")
-    return Quantity(value=value, unit=UNITS[key], source=source)
 
 
 def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported:
@@ -157,7 +100,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
     InputError
         If numbers are missing, or the vehicle is none that can fly.
     """
-    given = _checked(given)
+    given = checked(given)
     numbers = _with_given(draft, given)
     if "thrust_max" not in numbers and draft.hover_share is not None and "mass" in numbers:
         numbers["thrust_max"] = _thrust_of_hover(draft, numbers["mass"].value)
@@ -203,55 +146,6 @@ def levels(places: Iterable[tuple[float, float, float]]) -> list[str]:
     return found
 
 
-def same(values: Iterable[float], what: str, where: str, hint: str) -> float:
-    """The value that all have, to a part in a thousand.
-
-    Parameters
-    ----------
-    values : iterable of float
-    what : str
-        For the message.
-    where : str
-        The source.
-    hint : str
-        How to mend it.
-
-    Raises
-    ------
-    InputError
-        If they differ.
-    """
-    found = list(values)
-    if max(found) - min(found) > 1e-3 * max(map(abs, found)):
-        raise InputError(
-            f"{where}: {what} differs between rotors ({min(found):g} to {max(found):g}); a vehicle has one: {hint}"
-        )
-    return found[0]
-
-
-def finite(text: str, what: str, where: str) -> float:
-    """A finite number that a source writes.
-
-    Parameters
-    ----------
-    text : str
-    what : str
-        What it is, for the message.
-    where : str
-        The source.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
-    number = plain_number(text.strip())
-    if math.isnan(number):
-        short = text.strip()[:40]
-        raise InputError(f"{where}: {what} is {short!r}; allowed: a finite number, such as 0.5 or 1e-3")
-    return number
-
-
 # ------------------------------------------------------------------------------------------------------------ numbers
 
 _FIRST = [
@@ -259,40 +153,6 @@ _FIRST = [
     "thrust_coefficient",
     *(key for key in UNITS if key not in ("thrust_max", "thrust_coefficient")),
 ]
-
-
-def _checked(given: Given) -> Given:
-    """The numbers of the user as floats, each of which can be one of a vehicle."""
-    found: dict[str, float] = {}
-    for key, value in given._asdict().items():
-        if value is None:
-            continue
-        parts = value if key == "inertia" and isinstance(value, (tuple, list)) else (value,)
-        numbers = [real_or_nan(part) for part in parts]
-        low = "0 or more" if key in ("thrust_min", "rotor_inertia", "linear_drag") else "greater than 0"
-        good = all(number > 0.0 or (number == 0.0 and low == "0 or more") for number in numbers)
-        if not good or len(numbers) != (3 if key == "inertia" else 1):
-            what = "three finite numbers" if key == "inertia" else "a finite number"
-            raise InputError(f"{key}: got {short(value)}; allowed: {what}, {low}, in {_UNIT_OF[key]}")
-        found[key] = tuple(numbers) if key == "inertia" else numbers[0]  # type: ignore[assignment]
-    return Given(**found)  # type: ignore[arg-type]
-
-
-def real_or_nan(value: object) -> float:
-    """A number as a finite float; NaN if it is none.
-
-    Parameters
-    ----------
-    value : object
-    """
-    try:
-        number = real(value)
-    except PydanticCustomError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan
-
-
-_UNIT_OF = {**UNITS, "inertia": "kg m^2", "arm": "m"}
 
 
 def _with_given(draft: Draft, given: Given) -> dict[str, Quantity]:
@@ -373,18 +233,3 @@ def _missing(keys: list[str], estimate: bool) -> str:
 def _digits(value: float) -> float:
     """A derived number with the digits that it deserves."""
     return float(f"{value:.6g}")
-
-
-def layout(name: str, rotors: Iterable[tuple[float, float, bool, str]]) -> Frame:
-    """A frame to be drawn, of rotors in the order of a vehicle.
-
-    Parameters
-    ----------
-    name : str
-    rotors : iterable of (float, float, bool, str)
-        Forward and left in m, whether it turns clockwise, "upper", "lower" or "".
-    """
-    known = list(rotors)
-    arm = max(max(math.hypot(x, y) for x, y, _, _ in known), 1e-300)
-    motors = tuple(Motor(k, x / arm, y / arm, turn, level) for k, (x, y, turn, level) in enumerate(known, start=1))
-    return Frame(name, (), motors, REFERENCE)

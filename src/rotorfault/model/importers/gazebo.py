@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 from rotorfault.base.errors import InputError
 from rotorfault.model.importers.bodies import Body, Pose, together
-from rotorfault.model.importers.draft import GRAVITY, Draft, SourceRotor, finite, levels, quantity, same
+from rotorfault.model.importers.draft import Draft, SourceRotor, levels
+from rotorfault.model.importers.numbers import GRAVITY, finite, quantity, same
 from rotorfault.model.importers.xml_text import text_of
 from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.model.vehicle_file import Quantity

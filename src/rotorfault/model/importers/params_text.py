@@ -18,7 +18,7 @@ import numpy as np
 
 from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError
-from rotorfault.model.importers.draft import finite
+from rotorfault.model.importers.numbers import finite
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{1,19}")
 MOST_LINES = 20_000  # a complete list of an autopilot has about 1,500

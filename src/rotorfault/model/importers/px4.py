@@ -16,8 +16,9 @@ from pathlib import Path
 
 from rotorfault.base.errors import InputError
 from rotorfault.model.frames import ALIASES, FRAMES
-from rotorfault.model.importers.draft import Draft, SourceRotor, levels, quantity, same
+from rotorfault.model.importers.draft import Draft, SourceRotor, levels
 from rotorfault.model.importers.frame_match import number_of
+from rotorfault.model.importers.numbers import quantity, same
 from rotorfault.model.importers.params_text import Params, read_params
 from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.model.vehicle_file import VehicleFile

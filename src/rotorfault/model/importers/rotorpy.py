@@ -24,7 +24,8 @@ import numpy as np
 from rotorfault.base import foreign
 from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError
-from rotorfault.model.importers.draft import GRAVITY, Draft, SourceRotor, levels, quantity, real_or_nan
+from rotorfault.model.importers.draft import Draft, SourceRotor, levels
+from rotorfault.model.importers.numbers import GRAVITY, quantity, real_or_nan
 from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.model.vehicle_file import Quantity
 

@@ -9,7 +9,8 @@ from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.model.importers.ardupilot import ardupilot_params, read_ardupilot
-from rotorfault.model.importers.draft import Draft, Given, Imported, completed
+from rotorfault.model.importers.draft import Draft, Imported, completed
+from rotorfault.model.importers.numbers import Given
 from rotorfault.model.importers.px4 import px4_text, read_px4
 from rotorfault.model.importers.rotorpy import read_rotorpy
 from rotorfault.model.importers.sdf import read_sdf

@@ -14,7 +14,7 @@ from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
 from rotorfault.model.importers.bodies import Body, Pose, rotation
-from rotorfault.model.importers.draft import finite
+from rotorfault.model.importers.numbers import finite
 
 MOST_DEPTH = 60  # of elements in each other; models have about ten
 MOST_CHARACTERS = 4_000_000
