@@ -20,7 +20,7 @@ def export(
         Path,
         typer.Argument(
             metavar="FLIGHT.nc",
-            help="A flight file that 'rotorfault fly' wrote; or the word 'vehicle', then a vehicle.",
+            help="A flight file that 'rotorfault fly' wrote, or the word 'vehicle'.",
         ),
     ],
     vehicle: Annotated[
