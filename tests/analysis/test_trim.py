@@ -340,7 +340,7 @@ def test_the_report_reads_well() -> None:
 def test_the_report_says_what_losses_leave_of_hover(
     losses: list[str], held: str, given_up: str, spinning: str
 ) -> None:
-    report = trim_report("paper", "smc", loss=parse_losses(losses))
+    report = trim_report("paper", "smc", loss=parse_losses(losses, 4))
     text = report.text()
     assert f"yaw held      {held} " in text
     assert f"yaw given up  {given_up} " in text
@@ -358,7 +358,7 @@ def report_block(text: str) -> str:
 
 
 def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle: Vehicle) -> None:
-    loss = parse_losses(["3=0.25", "1=0.5"])
+    loss = parse_losses(["3=0.25", "1=0.5"], 4)
     assert list(loss) == [0.5, 0.0, 0.25, 0.0]
     report = trim_report(paper_vehicle, "smc", loss=loss).attainable
     assert report.margin == hover_margin(paper_vehicle, loss)
@@ -367,7 +367,7 @@ def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle:
     assert math.isnan(report.critical_with_yaw.r2)
     # Rotors that cannot stop, and a partner that cannot give as much as they do at least.
     stiff = paper_vehicle._replace(thrust_min=3.0)
-    assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"])).text()
+    assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"], 4)).text()
 
 
 def test_a_report_on_an_unstable_loop_says_so(unstable: TrimReport) -> None:

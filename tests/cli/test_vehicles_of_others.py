@@ -113,3 +113,12 @@ def test_exports_that_are_not_right_are_refused_in_a_line(words: list[str], told
     assert done.returncode == 2
     assert told in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("name", "last"), [("deadcat", 4), ("f550", 6), ("x8", 8)])
+def test_trim_takes_a_loss_of_any_rotor_of_a_frame(name: str, last: int) -> None:
+    done = run("trim", name, "--loss", f"{last}=0.5")
+    assert done.returncode == 0, done.stderr
+    beyond = run("trim", name, "--loss", f"{last + 1}=0.5")
+    assert beyond.returncode == 2
+    assert f"rotor 1 to {last}" in beyond.stderr

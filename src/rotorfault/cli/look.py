@@ -107,7 +107,10 @@ def trim(
     """
     from rotorfault.analysis.trim import trim_report
     from rotorfault.cli.losses import parse_losses
+    from rotorfault.model.vehicle_file import load_vehicle
     from rotorfault.scenario.overrides import parse_overrides
 
     settings = parse_overrides(assignments or [])
-    say(trim_report(vehicle, controller, preset, period, parse_losses(losses or []), settings=settings).text())
+    file = load_vehicle(vehicle)
+    loss = parse_losses(losses or [], len(file.rotor))
+    say(trim_report(vehicle, controller, preset, period, loss, settings=settings).text())

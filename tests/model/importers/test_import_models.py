@@ -193,3 +193,12 @@ def test_a_vehicle_file_holds_any_text_of_a_source(tmp_path: Path) -> None:
     path.write_text(text, encoding="utf-8")
     rf.import_vehicle("urdf", path, "mine", out=tmp_path / "mine.toml")
     assert 'r "\\ ]] = 0' in rf.load_vehicle(tmp_path / "mine.toml").rotor[0].x.source
+
+
+@pytest.mark.parametrize("speed", ["1e200", "1e400", "nan"])
+def test_numbers_beyond_all_bounds_are_refused_in_a_line(speed: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(CRAZYFLIE.read_text(encoding="utf-8").replace("2500.0", speed), encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        rf.import_vehicle("rotorpy", f"{path}:quad_params", "cf", estimate=True)
+    assert "rotor_speed_max" in str(refused.value) or "is read only by running it" in str(refused.value)

@@ -57,7 +57,10 @@ def estimate_of(key: str, known: Known) -> tuple[float, str]:
         Of the vehicle file; not ``"mass"``.
     known : Known
     """
-    value, how = _ESTIMATES[key](known)
+    try:
+        value, how = _ESTIMATES[key](known)
+    except OverflowError:
+        value, how = math.inf, "made of numbers that no vehicle has"
     return float(f"{value:.3g}"), f"our estimate: {how}"
 
 

@@ -163,7 +163,7 @@ def _of_plugins(motors: list[Motor], mass: float, where: str) -> dict[str, Quant
         known["torque_ratio"] = quantity("torque_ratio", torque, f"{where}: momentConstant")
     if speed is not None:
         source = f"{where}: motorConstant times the square of maxRotVelocity, {speed:g} rad/s"
-        known["thrust_max"] = quantity("thrust_max", _digits(thrust * speed**2), source)
+        known["thrust_max"] = quantity("thrust_max", _digits(thrust * speed * speed), source)
     lags = [lag for tag in ("timeConstantUp", "timeConstantDown") if (lag := common(tag))]
     if lags and min(lags) > 0.0:
         mean = math.fsum(lags) / len(lags)

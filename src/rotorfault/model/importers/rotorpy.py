@@ -215,7 +215,7 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
     for key, name in (("thrust_min", "rotor_speed_min"), ("thrust_max", "rotor_speed_max")):
         speed = _number(found, name, where)
         if speed is not None and thrust:
-            take(key, name, " squared, times k_eta", thrust * speed**2)
+            take(key, name, " squared, times k_eta", thrust * speed * speed)
     drag = _number(found, "k_d", where)
     if drag and mass and thrust and mass > 0.0 and thrust > 0.0:
         total = math.sqrt(len(rotors) * mass * GRAVITY / thrust)
