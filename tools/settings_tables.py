@@ -26,6 +26,7 @@ from rotorfault.model.frames import FRAMES
 from rotorfault.model.quantities import AirFile, Rotor
 from rotorfault.model.slot import Slot, telemetry_of
 from rotorfault.model.telemetry import RPY, Signal, signals_of
+from rotorfault.model.vehicle import Opposite
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle, vehicle_names
 from rotorfault.scenario.part import DEFAULT_PRESET, NO_PRESET
 from rotorfault.scenario.setting_rows import Setting, inner_model, scenario_settings, settings, toml_value
@@ -164,15 +165,27 @@ def _attainable_table() -> str:
     rows = []
     for name in vehicle_names():
         vehicle = load_vehicle(name).vehicle
-        sound, dead = PerRotor.all(0.0), PerRotor(1.0, 0.0, 0.0, 0.0)
+        sound = PerRotor.all(0.0, vehicle.rotors)
+        dead = PerRotor(1.0, *[0.0] * (vehicle.rotors - 1))
         margin, after = hover_margin(vehicle, sound), hover_margin(vehicle, dead)
-        together = critical_pair(vehicle, 1, 3, [0.5], yaw=False)[0] + 0.5
+        # What a sum of two losses means is clear for two pairs alone. Equal ones are both below 1.
+        one = margin.needed / margin.thrust_with_yaw
+        rotor = vehicle.pairs.order[2] + 1 if isinstance(vehicle.pairs, Opposite) else 0
+        both = critical_pair(vehicle, 1, rotor, [1.0 - one], yaw=False)[0] + 1.0 - one if rotor else None
+        together = "n/a" if both is None else f"{both:.4f}"
         torque = ", ".join(f"{t:.3g}" for t in torque_reserve(vehicle, sound))
         left = ", ".join(f"{t:.3g}" for t in list(torque_reserve(vehicle, dead, yaw=False))[:2])
-        losses = (critical_loss(vehicle, 1), critical_loss(vehicle, 1, yaw=False), together)
+        losses = (critical_loss(vehicle, 1), critical_loss(vehicle, 1, yaw=False))
         thrust = f"{margin.thrust_with_yaw / margin.needed:.4f}"
         rows.append(
-            [f"`{name}`", thrust, *(f"{x:.4f}" for x in losses), torque, left if after.without_yaw else "none"]
+            [
+                f"`{name}`",
+                thrust,
+                *(f"{x:.4f}" for x in losses),
+                together,
+                torque,
+                left if after.without_yaw else "none",
+            ]
         )
     return _markdown(header, rows)
 

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from rotorfault.model.block import Context, Nothing
     from rotorfault.model.conventions import convert
     from rotorfault.model.frames import Frame, frame_names, load_frame
+    from rotorfault.model.importers.vehicles import export_vehicle, import_vehicle
     from rotorfault.model.signals import Allocation, Diagnosis, Estimate, Reading, Readings, Reference, State, Wrench
     from rotorfault.model.slot import register
     from rotorfault.model.telemetry import Quantity
@@ -128,11 +129,13 @@ _HOME = {
     "critical_loss_with": "analysis.controllability",
     "critical_pair": "analysis.hover",
     "critical_thrust_to_weight": "analysis.controllability",
+    "export_vehicle": "model.importers.vehicles",
     "fly": "flight.fly",
     "fly_all": "flight.fly",
     "fly_many": "flight.many",
     "frame_names": "model.frames",
     "hover_margin": "analysis.hover",
+    "import_vehicle": "model.importers.vehicles",
     "load": "flight.flight",
     "load_frame": "model.frames",
     "load_scenario": "scenario.library",
@@ -215,11 +218,13 @@ __all__ = [
     "critical_loss_with",
     "critical_pair",
     "critical_thrust_to_weight",
+    "export_vehicle",
     "fly",
     "fly_all",
     "fly_many",
     "frame_names",
     "hover_margin",
+    "import_vehicle",
     "load",
     "load_frame",
     "load_scenario",

@@ -21,7 +21,7 @@ from rotorfault.cli.losses import parse_losses
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.signals import Command, Estimate, Reference, Wrench
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Opposite, Vehicle, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.scenario.library import load_scenario
 
@@ -199,7 +199,12 @@ def test_trim_warns_of_a_vehicle_by_its_numbers_alone(name: str) -> None:
     vehicle = load_vehicle(name).vehicle
     assert not [line for line in trim_report(vehicle, "smc").warnings if "hover leaves" in line]
     y = 2.0 * vehicle.inertia.x / (vehicle.mass * vehicle.gravity)  # turns the vehicle with 2 rad/s^2
-    thin = vehicle._replace(rotor_x=PerRotor(0.22, -0.22, 0.22, -0.22), rotor_y=PerRotor(y, -y, -y, y))
+    thin = vehicle._replace(
+        rotor_x=PerRotor(0.22, -0.22, 0.22, -0.22),
+        rotor_y=PerRotor(y, -y, -y, y),
+        rotor_yaw_sign=PerRotor(1.0, 1.0, -1.0, -1.0),
+        pairs=Opposite((0, 1, 2, 3)),
+    )
     (line,) = [line for line in trim_report(thin, "smc").warnings if line.startswith("roll: hover leaves")]
     assert f"{hover(thin).torque_max.x / thin.inertia.x:.3g} rad/s^2 (lever {1e3 * y:.3g} mm" in line
 
@@ -335,7 +340,7 @@ def test_the_report_reads_well() -> None:
 def test_the_report_says_what_losses_leave_of_hover(
     losses: list[str], held: str, given_up: str, spinning: str
 ) -> None:
-    report = trim_report("paper", "smc", loss=parse_losses(losses))
+    report = trim_report("paper", "smc", loss=parse_losses(losses, 4))
     text = report.text()
     assert f"yaw held      {held} " in text
     assert f"yaw given up  {given_up} " in text
@@ -353,7 +358,7 @@ def report_block(text: str) -> str:
 
 
 def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle: Vehicle) -> None:
-    loss = parse_losses(["3=0.25", "1=0.5"])
+    loss = parse_losses(["3=0.25", "1=0.5"], 4)
     assert list(loss) == [0.5, 0.0, 0.25, 0.0]
     report = trim_report(paper_vehicle, "smc", loss=loss).attainable
     assert report.margin == hover_margin(paper_vehicle, loss)
@@ -362,7 +367,7 @@ def test_the_block_on_attainable_hover_is_what_the_functions_give(paper_vehicle:
     assert math.isnan(report.critical_with_yaw.r2)
     # Rotors that cannot stop, and a partner that cannot give as much as they do at least.
     stiff = paper_vehicle._replace(thrust_min=3.0)
-    assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"])).text()
+    assert "no balance" in trim_report(stiff, "smc", loss=parse_losses(["1=0.9"], 4)).text()
 
 
 def test_a_report_on_an_unstable_loop_says_so(unstable: TrimReport) -> None:

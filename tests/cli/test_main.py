@@ -166,7 +166,11 @@ USAGE = [
     ("animate a.nc --fps=abc", "--fps: got 'abc'; allowed: a number"),
     ("campaign x --workers 0", "--workers: got '0'; allowed: a whole number from 1 on"),
     ("ranges --seeds 101", "--seeds: got '101'; allowed: a whole number from 1 to 100"),
-    ("export", "FLIGHT.nc is missing: A flight file that 'rotorfault fly' wrote; see 'rotorfault export --help'"),
+    (
+        "export",
+        "FLIGHT.nc is missing: A flight file that 'rotorfault fly' wrote, or the word 'vehicle'; see 'rotorfault "
+        "export --help'",
+    ),
     ("convert position 1 2 3 --from ned", "--to is missing: One of those that --from takes; see"),
     ("convert position --from px4 --to ned", "position: no values came; give 3 after it (x, y, z), as in"),
     ("fly --seed", "--seed needs a value after it; see 'rotorfault fly --help'"),

@@ -28,8 +28,8 @@ def settings(vehicle: str, law: str) -> dict[str, object]:
     return {"vehicle": vehicle, "controller.kind": law, "controller.preset": PRESETS[vehicle]}
 
 
-def test_every_built_in_vehicle_has_one() -> None:
-    assert set(PRESETS) == set(rf.vehicle_names())
+def test_they_fit_their_vehicles() -> None:
+    assert set(PRESETS) <= set(rf.vehicle_names())
     for vehicle, preset in PRESETS.items():
         for law in ("roismc", "smc"):
             made = record(law, preset)

@@ -16,11 +16,12 @@ from rotorfault.maths.records import flatten
 from rotorfault.model.block import Context
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench, healthy
 from rotorfault.model.vehicle import Vehicle, wrench_of
-from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
+from rotorfault.model.vehicle_file import load_vehicle
 
 Array = NDArray[np.float64]
 PAPER = load_vehicle("paper").vehicle
-VEHICLES = {name: load_vehicle(name).vehicle for name in vehicle_names()}
+PAIRED = ("crazyflie-2.1", "hummingbird", "paper", "paper-arm-0225", "paper-iz-33e-4")  # small, large, slow, strong
+VEHICLES = {name: load_vehicle(name).vehicle for name in PAIRED}
 # Stretched X with a floor below the thrust, a gain and the other sense of rotation: nothing cancels by luck.
 VEHICLES["stretched"] = PAPER._replace(
     rotor_x=PerRotor(0.2, -0.2, -0.15, 0.15),

@@ -16,11 +16,14 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
-BUILT_IN = ("crazyflie-2.1", "hummingbird", "paper", "paper-arm-0225", "paper-iz-33e-4")
+BUILT_IN = (
+    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hitsz", "hummingbird", "minnie", "mueller-2014",
+    "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8", "y6",
+)  # fmt: skip
 
 
 def test_the_built_in_vehicles_are_there() -> None:
-    assert set(BUILT_IN) <= set(vehicle_names())
+    assert list(BUILT_IN) == vehicle_names()
 
 
 @pytest.mark.parametrize("name", vehicle_names())
@@ -28,8 +31,8 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     file = load_vehicle(name)
     assert file.name == name
     assert file.description
-    assert 1.5 < file.thrust_to_weight < 4.0
-    assert len(dict(file.quantities())) == 14 + 8
+    assert 1.5 < file.thrust_to_weight < 5.0
+    assert len(dict(file.quantities())) == 14 + 2 * len(file.rotor)
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
 
 

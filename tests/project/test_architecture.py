@@ -16,7 +16,8 @@ BELIEF = ("autopilot",)
 # Imports that may wait inside a function until they are needed, by module, and why.
 # A command of the command line loads what it runs when it is called, so that `--help` and `list` cost nothing.
 COMMANDS = tuple(
-    f"rotorfault.cli.{name}" for name in ("campaign", "convert", "export", "fly", "frames", "look", "studies", "tune")
+    f"rotorfault.cli.{name}"
+    for name in ("campaign", "convert", "export", "fly", "frames", "look", "new", "studies", "tune")
 )
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"

@@ -173,5 +173,5 @@ def test_knowledge_has_one_home(pattern: str, homes: set[str]) -> None:
 
 def test_tests_lie_where_their_subjects_do() -> None:
     folders = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir() and not path.name.startswith("__")}
-    assert folders - {"project", "fuzz", "helpers", "golden"} <= set(ROOMS)
+    assert folders - {"project", "fuzz", "helpers", "golden", "data"} <= set(ROOMS)
     assert not sorted((ROOT / "tests").glob("test_*.py"))

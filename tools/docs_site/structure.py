@@ -88,6 +88,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
         "Scenarios, vehicles, frames",
         "What a flight is made of, as files and as objects; and the conventions of others.",
         ["load_scenario", "scenario_names", "Scenario", "neighbour", "load_vehicle", "vehicle_names", "Vehicle",
+         "import_vehicle", "export_vehicle",
          "convert", "frame_names", "load_frame", "Frame"],
     ),
     "slots": (

@@ -92,8 +92,8 @@ def _lines(shown: Mapping[str, Mapping[str, str]]) -> str:
     return "\n\n".join(blocks)
 
 
-def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
-    """Write a template; its path.
+def write_new(what: str, name: str, folder: Path, force: bool, content: str | None = None) -> Path:
+    """Write a template, or the content that is given instead of it; its path.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def write_new(what: str, name: str, folder: Path, force: bool) -> Path:
     name = name.removesuffix(".toml")
     if "/" in name or "\\" in name or name in (".", "..") or len(name.encode()) > 200:
         raise InputError(f"name '{name}'; allowed: a plain, short name without folders; give the folder with --out")
-    content = makers[what](name)
+    content = makers[what](name) if content is None else content
     path = output_folder(folder) / f"{name}.toml"
     if path.exists() and not force:
         raise InputError(f"{path}: exists already; choose another name, or overwrite it with --force")

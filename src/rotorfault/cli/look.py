@@ -1,4 +1,4 @@
-"""The commands that fly nothing: `list`, `new`, `check` and `trim`."""
+"""The commands that look and write nothing: `list`, `check` and `trim`."""
 
 from __future__ import annotations
 
@@ -32,20 +32,6 @@ def list_parts(
     from rotorfault.cli import catalogue
 
     say(catalogue.text(what or (), allow_code))
-
-
-@app.command()
-def new(
-    what: Annotated[str, typer.Argument(metavar="vehicle|scenario|study", help="What to write.")],
-    name: Annotated[str, typer.Argument(help="Its name; the file becomes NAME.toml.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the file.")] = Path("."),
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that exists.")] = False,
-) -> None:
-    """Write a commented TOML file that works, to start from."""
-    from rotorfault.cli import catalogue
-
-    path = catalogue.write_new(what, name, out, force)
-    say(f"wrote {path}; check it with: rotorfault check {path}")
 
 
 @app.command()
@@ -126,5 +112,5 @@ def trim(
 
     settings = parse_overrides(assignments or [])
     file = load_vehicle(vehicle)
-    lost = parse_losses(losses or [], len(file.rotor))
-    say(trim_report(file, controller, preset, period, lost, settings=settings).text())
+    loss = parse_losses(losses or [], len(file.rotor))
+    say(trim_report(vehicle, controller, preset, period, loss, settings=settings).text())

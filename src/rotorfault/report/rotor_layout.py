@@ -43,17 +43,29 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
         ends = np.array([(0.0, 0.0), place])
         axes.plot(*ends[:, ::-1].T, color="0.8", linewidth=5.0, solid_capstyle="round", zorder=1)
     seen: list[Array] = []
-    for number, (rotor, place) in enumerate(zip(vehicle.rotor, places, strict=True), start=1):
+    for rotor, place in zip(vehicle.rotor, places, strict=True):
         below = sum(math.dist(place, other) <= SAME * largest for other in seen)
-        _draw_rotor(axes, number, rotor.yaw, place, radius, below)
+        _draw_rotor(axes, rotor.yaw, place, radius, below)
+        if not below:
+            # Coaxial rotors share one label, in the order of the file.
+            here = [k for k, other in enumerate(places, start=1) if math.dist(place, other) <= SAME * largest]
+            label = ", ".join(map(str, here))
+            axes.text(
+                float(place[1]), float(place[0]), label, ha="center", va="center", zorder=8, color=BLACK,
+                fontsize=12.0 if len(here) == 1 else 9.0,
+            )  # fmt: skip
         seen.append(place)
     _draw_axes(axes, largest, radius)
     # Of arms of one length the rotor that lies where the body axes are not: behind, or to the right.
     given: list[float] = []
+    several = float(arms.max() - arms.min()) > SAME * largest
     for k in sorted(range(len(places)), key=lambda k: (places[k].sum(), k)):
         if all(abs(arms[k] - length) > SAME * largest for length in given) and len(given) < MOST_LENGTHS:
             given.append(float(arms[k]))
-            _draw_length(axes, places[k], OFF * radius)
+            # Of several the one of an arm to the rear goes below it, out of the way of the others.
+            _draw_length(
+                axes, places[k], OFF * radius, (-0.2, -1.0) if several and places[k][0] < 0.0 else (-1.0, -0.5)
+            )
     reach = np.abs(places).max(axis=0) + 1.45 * radius
     axes.set(xlim=(reach[1] * 1.15, -reach[1] * 1.15), ylim=(-reach[0], reach[0]), aspect="equal")
     axes.set_xlabel("y, left (m)")
@@ -67,17 +79,12 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
     return figure
 
 
-def _draw_rotor(axes: Axes, number: int, sign: str, place: Array, radius: float, below: int) -> None:
+def _draw_rotor(axes: Axes, sign: str, place: Array, radius: float, below: int) -> None:
     """A rotor, inside those that sit at the same place before it."""
     colour = LOOKS[sign][0]
     x, y = float(place[0]), float(place[1])
     radius *= 1.0 - 0.32 * below
     axes.add_patch(Circle((y, x), radius, facecolor="white", edgecolor=colour, linewidth=1.2, zorder=2 + below))
-    # Numbers of coaxial rotors stand side by side.
-    axes.annotate(
-        str(number), (y, x), xytext=(-7.0 + 14.0 * below if below else 0.0, 0.0), textcoords="offset points",
-        ha="center", va="center", fontsize=12.0, color=BLACK, zorder=8,
-    )  # fmt: skip
     # Two open arcs inside the disc, each with a head; angles count from forward towards the left.
     for start in (0.25 * math.pi, 1.25 * math.pi):
         sweep = np.linspace(0.0, 0.6 * math.pi, 25) * (-1.0 if sign == "+" else 1.0) + start
@@ -114,12 +121,12 @@ def _draw_axes(axes: Axes, largest: float, radius: float) -> None:
     axes.text(-off, off, "$z_B$", ha="center", va="center", zorder=5)
 
 
-def _draw_length(axes: Axes, place: Array, off: float) -> None:
-    """A dimension line beside the arm from the centre of mass to a rotor."""
+def _draw_length(axes: Axes, place: Array, off: float, side: tuple[float, float]) -> None:
+    """A dimension line beside the arm from the centre of mass to a rotor, on the side of a direction as drawn."""
     arm = float(np.hypot(*place))
     along = np.array([place[1], place[0]]) / arm  # as drawn: y across, x up
     aside = off * np.array([along[1], -along[0]])
-    aside = aside if aside @ [-1.0, -0.5] > 0.0 else -aside  # on the page right or below; the body axes point away
+    aside = aside if aside @ side > 0.0 else -aside  # the body axes point forward and left
     start, end = aside, along * arm + aside
     look = {"arrowstyle": "<|-|>", "color": GREY, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (float(end[0]), float(end[1])), (float(start[0]), float(start[1])), arrowprops=look)
