@@ -20,7 +20,7 @@ from matplotlib.transforms import Bbox
 from rotorfault.report.drawn import flights
 from rotorfault.report.figures import FIGURES
 from rotorfault.report.style import STYLE
-from rotorfault.results.whole import COUNTED, NUMBERS, TEXTS
+from rotorfault.results.whole import COUNTED, NUMBERS, PER_ROTOR, TEXTS
 from rotorfault.scenario.library import load_scenario
 
 ONSET, THRESHOLD, THRUST_MAX = 1.8, 0.12, 8.68
@@ -64,6 +64,7 @@ def made_up(
     given_too |= {"controller": "roismc", "threshold": THRESHOLD, "outcome": "settled", "end_time": duration}
     begun = onset if onset < duration else None
     counted: dict[str, object] = {"outcome": "settled", "survived": True, **dict.fromkeys(COUNTED)}
+    counted |= dict.fromkeys(f"{name}.{rotor}" for name in PER_ROTOR for rotor in (1, 2, 3, 4))
     given_too["scores"] = json.dumps(counted | {"onset.1": begun, "onset.2": None, "onset.3": begun, "onset.4": None})
     return dataset(signals, time, given_too | attributes)
 

@@ -80,7 +80,7 @@ def test_parts_are_had_by_slot_and_by_name() -> None:
         ({"fault": STEP}, "fault: must be a valid"),
         (
             {"fault": [STEP, {**STEP, "rotor": 5}]},
-            r"fault 2: rotor: must be less .* 4; got 5 \(key fault\.1\.rotor\)",
+            r"fault 2: rotor: got 5; allowed: 1 to 4, the rotors of 'paper' \(key fault\.1\.rotor\)",
         ),
     ],
 )

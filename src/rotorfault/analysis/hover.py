@@ -196,7 +196,8 @@ def critical_loss(
     InputError
         If there is no such rotor.
     """
-    own, loss = _index(rotor, vehicle), PerRotor.all(0.0, vehicle.rotors) if loss is None else loss
+    own = _index(rotor, vehicle)
+    loss = PerRotor.all(0.0, vehicle.rotors) if loss is None else loss
     needed, upright = _needed(vehicle, wind_W)
     if vehicle.pairs == ():
         others = PerRotor.of(0.0 if k == own else x for k, x in enumerate(loss))
@@ -358,6 +359,7 @@ def _room(vehicle: Vehicle) -> Scalar:
 
 def _index(rotor: int, vehicle: Vehicle) -> int:
     """Place of a rotor in the vehicle, from 0."""
+    require(vehicle, Vehicle, "vehicle", "a Vehicle, such as load_vehicle(...).vehicle")
     return whole_number(rotor, "rotor", 1, vehicle.rotors) - 1
 
 

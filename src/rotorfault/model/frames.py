@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.one_line import record_line
 
 
 def place_of(x: float, y: float) -> str:
@@ -84,7 +85,7 @@ class Frame(NamedTuple):
     reference: ReferenceVehicle
 
     def __repr__(self) -> str:
-        return f"<Frame {self.name}: {len(self.motors)} motors, numbered by {'; '.join(self.conventions)}>"
+        return record_line(self)
 
 
 MASS, GRAVITY, ARM = 1.535, 9.8, 0.275  # of Du's hexarotor

@@ -197,7 +197,7 @@ class Diagnosis(_Diagnosis):
         stuck: Stuck | None = None,
     ) -> Diagnosis:
         """What is not said of tests and stuck rotors is that there are none."""
-        count = len(loss)
+        count = len(loss) if isinstance(loss, PerRotor) else 0  # what it is made of is checked where it is used
         return super().__new__(
             cls,
             loss,

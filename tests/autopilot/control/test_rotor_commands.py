@@ -144,7 +144,7 @@ def test_numbers_without_a_name_are_neither_wrench_nor_thrusts(answer: Any) -> N
         def update(self, *_: Any) -> Any:
             return answer
 
-    message = r"Bare.update returned .*; allowed: Wrench\(.* in N and N m, or PerRotor\(r1, r2, r3, r4\) of thrusts"
+    message = r"Bare.update returned .*; allowed: Wrench\(.* in N and N m, or PerRotor\(r1, r2, \.\.\.\) of a thrust"
     with pytest.raises(InputError, match=message):
         rotorfault.fly(scenario(), controller=Bare())
 
