@@ -233,8 +233,9 @@ def load_frame(name: str) -> Frame:
     Examples
     --------
     >>> import rotorfault as rf
-    >>> rf.load_frame("px4-6001")
-    <Frame hexa-x: 6 motors, numbered by ArduPilot FRAME_CLASS 2 FRAME_TYPE 1; PX4 airframe 6001>
+    >>> frame = rf.load_frame("px4-6001")
+    >>> frame.name, len(frame.motors)
+    ('hexa-x', 6)
     """
     require(name, str, "frame", "a name, such as 'hexa-x'")
     found = FRAMES.get(ALIASES.get(name, name))
