@@ -9,7 +9,6 @@ import pytest
 from engine_flights import faulty_case_one, run, short
 from gates import needs_simd
 
-from rotorfault.engine import machine
 from rotorfault.engine.program import SameForAll, program, same_for_all, trace
 from rotorfault.engine.trace import Tape, add, less, multiply, subtract
 from rotorfault.flight.assembly import assemble, assemble_all
@@ -27,7 +26,7 @@ FLIGHTS: dict[str, Scenario] = {
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_no_bit_depends_on_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = run(FLIGHTS[name], "simd")
-    monkeypatch.setattr(machine, "same_for_all", lambda batch: SameForAll())
+    monkeypatch.setattr("rotorfault.engine.machine.same_for_all", lambda batch: SameForAll())
     open_ = run(FLIGHTS[name], "simd")
     np.testing.assert_array_equal(chosen.signals, open_.signals)
     np.testing.assert_array_equal(chosen.state[:20], open_.state[:20])

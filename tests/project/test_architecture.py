@@ -324,6 +324,52 @@ def test_needless_gates_are_seen() -> None:
         assert not needless_gates(ast.parse(code)), code
 
 
+def at_once(tree: ast.Module, module: str, path: Path) -> set[str]:
+    """What is imported as soon as a module is: not what waits inside a function or is there for types alone."""
+    lines = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    return set(imports(ast.Module(list(lines), []), module, path))
+
+
+@functools.cache
+def compilers() -> frozenset[str]:
+    """Modules that cannot be imported without llvmlite."""
+    edges = {module: at_once(tree_of(path), module, path) for module, path in MODULES.items()}
+    found = {module for module, used in edges.items() if any(name.startswith("llvmlite") for name in used)}
+    while more := {module for module, used in edges.items() if used & found} - found:
+        found |= more
+    return frozenset(found)
+
+
+def hasty(tree: ast.Module) -> set[str]:
+    """Modules that need llvmlite and are imported by a test file before it has asked for llvmlite."""
+    asks = next((k for k, node in enumerate(tree.body) if "importorskip('llvmlite')" in ast.unparse(node)), None)
+    first = next((k for k, node in enumerate(tree.body) if isinstance(node, ast.FunctionDef)), len(tree.body))
+    before = tree.body[: asks if asks is not None and asks < first else None]
+    return at_once(ast.Module(before, []), "tests", Path("test.py")) & compilers()
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_test_files_can_be_read_without_llvmlite(path: Path) -> None:
+    assert not hasty(tree_of(path))
+
+
+def test_hasty_imports_are_seen() -> None:
+    assert compilers() >= {"rotorfault.engine.native", "rotorfault.engine.machine", "rotorfault.engine.simd"}
+    assert "rotorfault.engine" not in compilers()
+    for code in (
+        "from rotorfault.engine import machine",
+        "from rotorfault.engine.simd import Simd\npytest.importorskip('llvmlite')",
+        "import rotorfault.engine.native\ndef test():\n    pytest.importorskip('llvmlite')",
+    ):
+        assert hasty(ast.parse(code)), code
+    for code in (
+        "from rotorfault.engine import cache",
+        "pytest.importorskip('llvmlite')\nfrom rotorfault.engine import machine",
+        "def test():\n    from rotorfault.engine import machine",
+    ):
+        assert not hasty(ast.parse(code)), code
+
+
 # ------------------------------------------------------------------------------------------------------------ files
 
 
