@@ -54,18 +54,19 @@ paper: .venv/.stamp-fly ## Reproduce the paper: every case, figure, table and cl
 ranges: .venv/.stamp-develop ## Search gains anew and give the paper's Table 1 as ranges (15 min on 2 idle cores)
 	.venv/$(BIN)/rotorfault ranges --out results/ranges
 
-test: .venv/.stamp-develop ## Run the tests but those that take long
-	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long"
+test: .venv/.stamp-develop ## Run the tests but those that take long and the code of the pages
+	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long and not pages"
 
 test-long: .venv/.stamp-develop ## Run the tests that take long
 	.venv/$(BIN)/python -m pytest -n 2 --dist loadfile -m long
 
-# Where something flies. What reads files, draws, judges, counts or linearises is the same with and without a compiler.
-NUMPY_TESTS := tests/autopilot tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli tests/engine \
-  tests/flight tests/loop tests/model tests/plant tests/project/test_examples.py tests/reference/test_own_signals.py
+# Where an engine is chosen. What reads files, draws, judges, counts or linearises is the same with and without a
+# compiler, and so are the equations themselves, of which the tests of plant, autopilot and model ask.
+NUMPY_TESTS := tests/campaigns/test_block.py tests/campaigns/test_run.py tests/cli tests/engine tests/flight tests/loop \
+  tests/project/test_examples.py tests/reference/test_own_signals.py
 
 test-numpy: .venv-numpy/.stamp ## Run the tests in which something flies without llvmlite, in .venv-numpy
-	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long" $(NUMPY_TESTS)
+	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long and not pages" $(NUMPY_TESTS)
 
 # Both ends of every bound in pyproject.toml: the lowest versions that it allows, and the newest that there are.
 BOUNDS_EXTRAS := flightcode,tune,cluster
@@ -108,7 +109,8 @@ peers: .venv/.stamp-bench ## The same beside crazyflow, RotorPy and l2f (install
 	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
 	@touch $@
 
-docs: .venv/.stamp-docs ## Build the site of the documentation in results/site; it runs the notebooks (1 min)
+docs: .venv/.stamp-docs ## Run the code of the pages and build the site in results/site, with its notebooks (3 min)
+	.venv/$(BIN)/python -m pytest -n 2 -m pages tests/project/test_pages.py
 	.venv/$(BIN)/python tools/docs_site/build.py
 
 docs-long: .venv/.stamp-develop ## Run the code of all pages as it stands, with what takes long (an hour on 2 cores)

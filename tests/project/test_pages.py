@@ -21,6 +21,7 @@ HERE = [path for path in PAGES if CODE[path] and ELSEWHERE not in path.read_text
 
 
 @needs_simd
+@pytest.mark.pages
 @pytest.mark.parametrize("path", HERE, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_the_code_of_a_page_runs(path: Path, tmp_path: Path) -> None:
     for package in ("cma", "pandas", "duckdb"):
