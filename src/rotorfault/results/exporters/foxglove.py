@@ -69,7 +69,7 @@ def schema(name: str) -> dict[str, Any]:
 
 def scene(vehicle: VehicleFile, stamp: Mapping[str, int]) -> dict[str, Any]:
     """The vehicle as it is drawn: arms, discs coloured by the way they turn, numbers."""
-    places = [(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor]
+    places = [(x, y) for x, y, _ in vehicle.places]
     apart = min((math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :]), default=1.0)
     reach = _reach(vehicle)
     discs, arms, texts = [], [], []
@@ -95,16 +95,16 @@ def thrust_arrows(vehicle: VehicleFile, thrust: Sequence[float], stamp: Mapping[
     down = {**up, "y": -up["y"]}
     arrows = [
         _arrow(
-            (rotor.x.value, rotor.y.value, 0.0), LENGTH * reach * abs(force) / vehicle.thrust_max.value, 0.05 * reach,
+            (x, y, 0.0), LENGTH * reach * abs(force) / max(vehicle.thrust_max.values), 0.05 * reach,
             up if force >= 0.0 else down, BLUE,
         )
-        for rotor, force in zip(vehicle.rotor, thrust, strict=True)
+        for (x, y, _), force in zip(vehicle.places, thrust, strict=True)
     ]  # fmt: skip
     return _update("thrust", stamp, arrows=arrows)
 
 
 def _reach(vehicle: VehicleFile) -> float:
-    return max(math.hypot(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor)
+    return max(math.hypot(x, y) for x, y, _ in vehicle.places)
 
 
 def _pose(x: float, y: float, z: float) -> dict[str, Any]:
