@@ -11,6 +11,7 @@ from gates import needs_simd
 
 import rotorfault as rf
 from rotorfault.base.errors import InputError
+from rotorfault.engine.taylor import fly_taylor
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.scenario.library import load_scenario
@@ -114,8 +115,6 @@ def odd_flight(**changes: Any) -> Scenario:
 def test_the_closed_loop_is_that_of_taylor_series_too() -> None:
     """Steps of 5 ms and of a quarter of it against a motion that is exact between sampling instants."""
     pytest.importorskip("heyoka")
-    from rotorfault.engine.taylor import fly_taylor
-
     exact = fly_taylor(assemble(odd_flight())).signals[:, POSITION]
     coarse, fine = (
         np.abs(run(odd_flight(step=step), "python").signals[:, POSITION] - exact).max() for step in (5e-3, 1.25e-3)

@@ -19,6 +19,7 @@ import numpy as np
 from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
 from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.reach import reach_lines
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
@@ -297,6 +298,7 @@ def _hover_lines(report: TrimReport) -> list[str]:
                 ("thrust to weight", f"{h.thrust_margin:.3g}"),
                 ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
                 ("rotor lag", _lag_text(v)),
+                *(("tilted rotors", line) for line in reach_lines(v)[1:]),
             ],
             "<<",
             indent=2,
@@ -306,10 +308,10 @@ def _hover_lines(report: TrimReport) -> list[str]:
 
 def _most_up(vehicle: Vehicle) -> float:
     """Greatest thrust in N of all rotors along body z."""
-    each_one = greatest_thrust(vehicle)
-    if not isinstance(each_one, PerRotor) and vehicle.tilt == ():
-        return float(vehicle.rotors * each_one)
-    return float(wrench_of(vehicle, spread(each_one, vehicle.rotors)).thrust)
+    most = greatest_thrust(vehicle)
+    if not isinstance(most, PerRotor) and vehicle.tilt == ():
+        return float(vehicle.rotors * most)
+    return float(wrench_of(vehicle, spread(most, vehicle.rotors)).thrust)
 
 
 def _lag_text(vehicle: Vehicle) -> str:

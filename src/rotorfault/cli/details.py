@@ -173,9 +173,13 @@ def vehicle_text(name: str) -> str:
     for key, quantity in file.quantities():
         if not key.startswith("rotor."):
             rows.append([key, value_text(quantity), quantity.unit, quantity.source])
-    rotors = [["rotor", "x [m]", "y [m]", "yaw", "name"]]
+    high, tilted = any(rotor.z for rotor in file.rotor), any(rotor.axis for rotor in file.rotor)
+    rotors = [["rotor", "x [m]", "y [m]", *["z [m]"] * high, "yaw", *["axis"] * tilted, "name"]]
     for number, rotor in enumerate(file.rotor, start=1):
-        rotors.append([str(number), f"{rotor.x.value:g}", f"{rotor.y.value:g}", rotor.yaw, rotor.name])
+        height = ["" if rotor.z is None else f"{rotor.z.value:g}"] * high
+        axis = ["up" if rotor.axis is None else value_text(rotor.axis)] * tilted
+        place = [f"{rotor.x.value:g}", f"{rotor.y.value:g}", *height]
+        rotors.append([str(number), *place, rotor.yaw, *axis, rotor.name])
     return "\n".join(
         [
             f"vehicle {file.name}: {file.description}",
