@@ -17,8 +17,9 @@ from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed,
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
 BUILT_IN = (
-    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hexa-tilt30", "hitsz", "hummingbird", "minnie", "mueller-2014",
-    "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8", "y6",
+    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hexa-tilt30", "hitsz", "hummingbird", "minnie",
+    "mueller-2014", "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8",
+    "y6",
 )  # fmt: skip
 
 

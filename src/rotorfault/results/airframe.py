@@ -45,6 +45,7 @@ class Airframe(NamedTuple):
     weight: float  # N
     thrust_max: float  # N per rotor; of rotors that differ, that of the strongest
     torque_ratio: float  # m; the mean
+    axes: Array | None = None  # (rotors, 3), along which rotors pull; None where all point up
 
     @property
     def rotors(self) -> int:
@@ -83,6 +84,7 @@ def airframe_of(data: FlightData) -> Airframe:
         weight=float(vehicle.mass * vehicle.gravity),
         thrust_max=float(max(spread(vehicle.thrust_max, vehicle.rotors))),
         torque_ratio=float(mean_of(vehicle.torque_ratio)),
+        axes=None if vehicle.tilt == () else np.array(file.axes),
     )
 
 

@@ -125,8 +125,7 @@ def _thrusts(rr: Any, stream: Any, data: FlightData, time: Any, file: VehicleFil
     for name, thrust, colour in (("thrust", true, BLUE), ("thrust_believed", believed, ORANGE)):
         if thrust is None or thrust.shape[1] != len(places):
             continue
-        vectors = np.zeros((*thrust.shape, 3))
-        vectors[..., 2] = np.nan_to_num(thrust) * LENGTH * reach / most
+        vectors = np.nan_to_num(thrust)[..., None] * np.array(file.axes) * (LENGTH * reach / most)
         count = [len(places)] * len(thrust)
         columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3), origins=np.tile(places, (len(thrust), 1)))
         rr.send_columns(f"world/vehicle/{name}", [time], columns.partition(count), recording=stream)
