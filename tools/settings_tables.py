@@ -19,10 +19,11 @@ from typing import Any
 
 from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
 from rotorfault.autopilot.control.cascade import CascadeSettings
-from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals
+from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals, TiltSignals
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.frames import FRAMES
+from rotorfault.model.importers.numbers import OPTIONAL
 from rotorfault.model.quantities import AirFile, Rotor
 from rotorfault.model.slot import Slot, telemetry_of
 from rotorfault.model.telemetry import RPY, Signal, signals_of
@@ -93,6 +94,7 @@ def _settings_table(rows: list[Setting]) -> str:
 
 def _vehicle_table() -> str:
     units = {key: quantity.unit for key, quantity in load_vehicle("paper").quantities()}
+    units |= OPTIONAL | {"centre_of_mass": "m"}
     rows = []
     for name, field in VehicleFile.model_fields.items():
         if name in ("rotor", "air"):
@@ -124,6 +126,7 @@ def _without_unit(text: str, unit: str) -> str:
 def _loop_signals_table() -> str:
     """What the loop records of itself."""
     recorded = {LoopSignals: "always", GroundSignals: "with `ground`", LandingSignals: "with `on_fault` = `land`"}
+    recorded[TiltSignals] = "with tilted rotors"
     rows = [_signal_row(signal, when) for kind, when in recorded.items() for signal in signals_of(kind)]
     return _markdown(["signal", "over time and", "unit", "frame", "recorded", "meaning"], rows)
 

@@ -17,8 +17,9 @@ from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed,
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
 BUILT_IN = (
-    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hitsz", "hummingbird", "minnie", "mueller-2014",
-    "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8", "y6",
+    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hexa-tilt30", "hitsz", "hummingbird", "minnie",
+    "mueller-2014", "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8",
+    "y6",
 )  # fmt: skip
 
 
@@ -32,7 +33,8 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     assert file.name == name
     assert file.description
     assert 1.5 < file.thrust_to_weight < 5.0
-    assert len(dict(file.quantities())) == 14 + 2 * len(file.rotor)
+    axes = sum(rotor.axis is not None for rotor in file.rotor)
+    assert len(dict(file.quantities())) == 14 + 2 * len(file.rotor) + axes
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
 
 

@@ -16,6 +16,7 @@ from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.motion import greatest_thrust, mean_of
 from rotorfault.model.vehicle import Vehicle
 
 UP, ROLL, PITCH, YAW = range(4)
@@ -53,7 +54,7 @@ def frame_of(vehicle: Vehicle, low: PerRotor, high: PerRotor, needed: Scalar) ->
         Thrust of hover.
     """
     columns = [x for row in effectiveness(vehicle) for x in row]
-    numbers = [*columns, *low, *high, needed, vehicle.rotor_gain * vehicle.thrust_max]
+    numbers = [*columns, *low, *high, needed, mean_of(greatest_thrust(vehicle))]
     whole = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in numbers))
     shape, count = whole[0].shape, vehicle.rotors
     cases, place = np.unique(np.stack([x.ravel() for x in whole], axis=1), axis=0, return_inverse=True)

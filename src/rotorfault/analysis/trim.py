@@ -19,6 +19,7 @@ import numpy as np
 from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
 from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.reach import reach_lines
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
@@ -32,11 +33,12 @@ from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
 from rotorfault.maths.arrays import ANGLES
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, spread, zeros
 from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.motion import greatest_thrust, span_text
 from rotorfault.model.signals import Wrench
 from rotorfault.model.slot import Slot
-from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.scenario.overrides import override_all
@@ -127,7 +129,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         rotor_speed=rotor_speeds(vehicle, thrust),
         attitude=attitude_for(force_W, 1.0, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
-        thrust_margin=vehicle.rotors * k * vehicle.thrust_max / needed,
+        thrust_margin=_most_up(vehicle) / needed,
         torque_max=Vec3.of(most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
     )
 
@@ -280,7 +282,7 @@ def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list
 
 def _hover_lines(report: TrimReport) -> list[str]:
     v, h = report.numbers, report.hover
-    limits = f"{v.thrust_min:g} to {v.thrust_max:g} N"
+    limits = f"{min(spread(v.thrust_min, v.rotors)):g} to {max(spread(v.thrust_max, v.rotors)):g} N"
     thrust, command = _span(h.thrust, 1.0), _span(h.command, 1.0)
     speed, rpm = _span(h.rotor_speed, 1.0), _span(h.rotor_speed, 30.0 / math.pi)
     torque = ", ".join(f"{t:.3g}" for t in h.torque_max)
@@ -295,12 +297,27 @@ def _hover_lines(report: TrimReport) -> list[str]:
                 ("speed of a rotor", f"{speed} rad/s ({rpm} rpm)"),
                 ("thrust to weight", f"{h.thrust_margin:.3g}"),
                 ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
-                ("rotor lag", f"{v.rotor_bandwidth:g} rad/s"),
+                ("rotor lag", _lag_text(v)),
+                *(("tilted rotors", line) for line in reach_lines(v)[1:]),
             ],
             "<<",
             indent=2,
         ),
     ]
+
+
+def _most_up(vehicle: Vehicle) -> float:
+    """Greatest thrust in N of all rotors along body z."""
+    most = greatest_thrust(vehicle)
+    if not isinstance(most, PerRotor) and vehicle.tilt == ():
+        return float(vehicle.rotors * most)
+    return float(wrench_of(vehicle, spread(most, vehicle.rotors)).thrust)
+
+
+def _lag_text(vehicle: Vehicle) -> str:
+    text = f"{span_text(vehicle.rotor_bandwidth)} rad/s"
+    down = vehicle.rotor_bandwidth_down
+    return text if isinstance(down, tuple) else f"{text} up, {span_text(down)} rad/s down"
 
 
 def _span(values: PerRotor, factor: float) -> str:

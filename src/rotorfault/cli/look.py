@@ -70,7 +70,8 @@ def check(
         raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
     line, warnings = catalogue.check(Path(file), allow_code)
     doubts = {0: "", 1: ", with a warning"}.get(len(warnings), f", with {len(warnings)} warnings")
-    say(f"{line}{doubts}")
+    first, *more = line.splitlines()
+    say("\n".join([f"{first}{doubts}", *more]))
     for warning in warnings:
         say(f"warning: {warning}", err=True)
 

@@ -96,6 +96,8 @@ class ClosedLoop:
         Signals of the reference's own.
     rotors : int
         Of the vehicle.
+    tilted : bool
+        Whether any of them is tilted.
 
     Attributes
     ----------
@@ -107,7 +109,14 @@ class ClosedLoop:
         parts = ", ".join(f"{slot.name} {type(part).__name__}" for slot, part in self.each())
         return cut(f"<closed loop of {parts}>", LONGEST)
 
-    def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing, rotors: int = 4) -> None:
+    def __init__(
+        self,
+        parts: Parts,
+        substeps: int,
+        reference: type[Record] = Nothing,
+        rotors: int = 4,
+        tilted: bool = False,
+    ) -> None:
         self.parts, self.rotors = dict(parts), rotors
         truth = {slot: part for slot, part in self.parts.items() if slot.side == "truth"}
         self.autopilot = Autopilot(
@@ -127,7 +136,7 @@ class ClosedLoop:
                 telemetry[slot.name] = part.Telemetry
         response = self.maybe(ON_FAULT)
         lands = response is not None and response.lands
-        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry, rotors)
+        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry, rotors, tilted)
         self.layout = self.recorder.layout
         self.scoring = Scoring(
             ground=self.plant.ground is not None,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple, final
 
 from rotorfault.autopilot.autopilot import AutopilotReport
-from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
@@ -64,6 +64,12 @@ class GroundSignals(NamedTuple):
     ground_force: Annotated[Scalar, Q("N", W, "true upward force of the ground")]
 
 
+class TiltSignals(NamedTuple):
+    """What flights of tilted rotors record."""
+
+    lateral_force: Annotated[Vec3, Q("N", B, "true force of the rotors across body z; a disturbance to position")]
+
+
 class LandingSignals(NamedTuple):
     """What flights record whose response to a fault may land."""
 
@@ -84,6 +90,8 @@ class Recorder:
         What each part records, by slot.
     rotors : int
         Of the vehicle.
+    tilted : bool
+        Whether any of them is tilted.
 
     Attributes
     ----------
@@ -91,12 +99,15 @@ class Recorder:
         Names, units and rows of all signals.
     """
 
-    def __init__(self, ground: bool, lands: bool, parts: dict[str, type[Record]], rotors: int = 4) -> None:
-        self._ground, self._lands = ground, lands
+    def __init__(
+        self, ground: bool, lands: bool, parts: dict[str, type[Record]], rotors: int = 4, tilted: bool = False
+    ) -> None:
+        self._ground, self._lands, self._tilted = ground, lands, tilted
         self._parts = {name: kind for name, kind in parts.items() if kind is not Nothing}
         common: list[type[Record]] = [LoopSignals]
         common += [GroundSignals] if ground else []
         common += [LandingSignals] if lands else []
+        common += [TiltSignals] if tilted else []
         signals = [signal for kind in common for signal in signals_of(kind)]
         # A record of their own: a slot may have the name of one of the loop's signals, as the wind has.
         self._own = record_type("PartSignals", tuple(self._parts))
@@ -156,4 +167,5 @@ class Recorder:
         )
         more = [truth.ground_force] if self._ground else []
         more += [decision.stage] if self._lands else []
+        more += [truth.lateral_B if isinstance(truth.lateral_B, Vec3) else zeros()] if self._tilted else []
         return self._record(*own, *more, self._own(*(telemetry[name] for name in self._parts)))

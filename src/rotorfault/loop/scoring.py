@@ -54,7 +54,7 @@ from rotorfault.loop.scores import (
     Scores,
     ScoringParameters,
 )
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor, zeros
 from rotorfault.maths.records import flatten, record_type, select_record
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import (
@@ -242,9 +242,8 @@ class Scoring:
         first = less(step, 0.5)
         command = signals.thrust_command
         changes = command.map(lambda new, old: absolute(new - old), scores.command)
-        at_limit = command.map(
-            lambda c: either(less_equal(c, parameters.command_low), greater_equal(c, parameters.command_high))
-        )
+        low, high = parameters.command_low, parameters.command_high
+        at_limit = per_rotor(lambda c, a, b: either(less_equal(c, a), greater_equal(c, b)), command, low, high)
         raised = signals.fault_flag.map(lambda now, before: both(greater(now, 0.5), less(before, 0.5)), scores.flags)
         false = [
             both(rises, negated(begun[rotor])) if rotor in begun else rises

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+import numpy as np
+from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator
 
-from rotorfault.base.config import Strict, refusal
+from rotorfault.base.config import Strict, Three, refusal
+from rotorfault.base.number_rule import real, short
 from rotorfault.maths.geometry import Vec3
 
 
@@ -19,17 +22,95 @@ class Quantity(Strict):
     source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
 
 
-def in_unit(unit: str, rule: Callable[[float], bool] | None = None, allowed: str = "") -> AfterValidator:
-    """Check that a quantity comes in this unit and its value within the allowed range."""
+def one_or_each(value: object) -> float | tuple[float, ...]:
+    """A finite number, or a list of them with one for each rotor; refuses anything else.
 
-    def check(quantity: Quantity) -> Quantity:
+    Parameters
+    ----------
+    value : object
+        As it came from a file or from Python.
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        value = value.tolist()
+    return tuple(_finite(item) for item in value) if isinstance(value, (list, tuple)) else _finite(value)
+
+
+def _finite(value: object) -> float:
+    found = real(value)
+    if not math.isfinite(found):
+        raise refusal("", f"got {short(found)}; allowed: a finite number")
+    return found
+
+
+def plain(value: float | tuple[float, ...]) -> float | list[float]:
+    """One number, or one for each rotor, as files hold it."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+OneOrEach = Annotated[
+    float | tuple[float, ...],
+    PlainValidator(one_or_each),
+    PlainSerializer(plain, return_type=float | list[float]),
+]
+"""One number for all rotors, or one for each of them."""
+
+
+class RotorQuantity(Strict):
+    """A number of the rotors, or one for each of them, with unit and where it comes from."""
+
+    value: OneOrEach = Field(description="the number, in `unit`; or a list with one for each rotor")
+    unit: str = Field(description="SI unit")
+    source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All numbers that it has: one, or as many as there are rotors."""
+        return self.value if isinstance(self.value, tuple) else (self.value,)
+
+    def of(self, rotors: int) -> tuple[float, ...]:
+        """The number of each of so many rotors."""
+        return self.value if isinstance(self.value, tuple) else (self.value,) * rotors
+
+
+class TripleQuantity(Strict):
+    """Three numbers along body x, y, z with their unit and where they come from."""
+
+    value: Three = Field(description="forward, left, up, in `unit`")
+    unit: str = Field(description="SI unit")
+    source: str = Field(min_length=1, description="publication, data sheet, or 'our choice: why'")
+
+
+def value_text(quantity: Quantity | RotorQuantity | TripleQuantity) -> str:
+    """The number of a quantity in few digits, or all that it has."""
+    value = quantity.value
+    return f"{value:g}" if isinstance(value, float) else ", ".join(f"{one:g}" for one in value)
+
+
+def in_unit(unit: str, rule: Callable[[float], bool] | None = None, allowed: str = "") -> AfterValidator:
+    """Check that a quantity comes in this unit and each of its values within the allowed range."""
+
+    def check(quantity: Quantity | RotorQuantity | TripleQuantity) -> Quantity | RotorQuantity | TripleQuantity:
         if quantity.unit != unit:
             raise refusal("unit", f"got '{quantity.unit}'; allowed: '{unit}'; convert the value to it")
-        if rule is not None and not rule(quantity.value):
-            raise refusal("value", f"got {quantity.value!r} {unit}; allowed: {allowed}")
+        for value in quantity.value if isinstance(quantity.value, tuple) else (quantity.value,):
+            if rule is not None and not rule(value):
+                raise refusal("value", f"got {value!r} {unit}; allowed: {allowed}")
         return quantity
 
     return AfterValidator(check)
+
+
+UNIT_LENGTH = 1e-3
+"""By how much the length of an axis may differ from 1: digits as they are printed; it is brought to 1."""
+
+
+def _unit_vector(quantity: TripleQuantity) -> TripleQuantity:
+    x, y, z = quantity.value
+    length = math.sqrt(x * x + y * y + z * z)
+    if not abs(length - 1.0) <= UNIT_LENGTH:
+        meant = f"; write [{x / length:.6g}, {y / length:.6g}, {z / length:.6g}]" if length > 0.0 else ""
+        raise refusal("value", f"got a vector of length {length:.6g}; allowed: 1, to {UNIT_LENGTH:g}{meant}")
+    return quantity
 
 
 def positive(unit: str) -> AfterValidator:
@@ -42,7 +123,9 @@ def not_negative(unit: str) -> AfterValidator:
 
 Inertia = Annotated[Quantity, positive("kg m^2")]
 Length = Annotated[Quantity, in_unit("m")]
-Thrust = Annotated[Quantity, not_negative("N")]
+Product = Annotated[Quantity, in_unit("kg m^2")]
+Place = Annotated[TripleQuantity, in_unit("m")]
+Direction = Annotated[TripleQuantity, in_unit("1"), AfterValidator(_unit_vector)]
 
 
 class Rotor(Strict):
@@ -52,6 +135,9 @@ class Rotor(Strict):
     y: Length = Field(description="left of the centre of mass, m")
     yaw: Literal["+", "-"] = Field(description="'+' if its drag torque turns the body towards positive yaw")
     z: Length | None = Field(default=None, description="above the centre of mass, m; 0 if not given")
+    axis: Direction | None = Field(
+        default=None, description="unit vector along which it pulls, in body axes, 1; straight up if not given"
+    )
     name: str = Field(default="", description="the vendor's name of the rotor")
 
 

@@ -9,7 +9,8 @@ Ground is a choice of structure: a flight without it has none of its operations.
 A rotor that speeds up turns the body the other way: what only outside torques change is J_z r + J_r Omega, body and
 rotors together. So that is integrated, as the rate about body z that the body would have if its rotors were stopped
 without a torque from outside; its own rate follows from the rotors' speeds, which are known. Momentum is then kept to
-rounding, and no derivative of a speed is needed (at a standing rotor there is none).
+rounding, and no derivative of a speed is needed (at a standing rotor there is none). With tilted rotors, or products
+of inertia, all of this is a vector: J omega + J_r Omega, and three rates.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from rotorfault.maths.scalar import Scalar
 from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
-from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
+from rotorfault.model.vehicle import Vehicle, lateral_force, residual_speed, turn_against_rotors, wrench_of
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
 from rotorfault.plant.integrator import rk4
@@ -65,15 +66,17 @@ class Truth(NamedTuple):
     loss: PerRotor  # 0 sound .. 1 dead
     air: Air
     ground_force: Scalar  # N, upwards
+    lateral_B: Vec3 | tuple[()] = ()  # N, force of the rotors across body z; empty where none is tilted
 
 
 class Forcing(NamedTuple):
     """What drives the body at one time of an integration step, whatever its motion."""
 
     wrench: Wrench  # of the rotors
-    residual_speed: Scalar  # rad/s
+    residual_speed: Scalar | Vec3  # rad/s; a vector in body axes of tilted rotors
     air: Air
     speeds: PerRotor | tuple[()] = ()  # rad/s, of the rotors; empty where the air does not ask for them
+    lateral_B: Vec3 | tuple[()] = ()  # N, force of the rotors across body z; empty where none is tilted
 
 
 @final
@@ -185,7 +188,12 @@ class Plant:
         fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt, parameters.vehicle.rotors)
         lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
         start, half, end = (self.residual_speed(output, fault, parameters) for output in lag.outputs)
-        times, speeds = (time, time + 0.5 * dt, time + dt), (start - (start - end) * lag.sag, half, end)
+        times, speeds = (time, time + 0.5 * dt, time + dt), [start, half, end]
+        if isinstance(lag.sag, PerRotor):
+            fast, _, slow = (true_rotor_speeds(parameters.vehicle, output, fault) for output in lag.outputs)
+            speeds[0] = residual_speed(parameters.vehicle, fast - (fast - slow) * lag.sag)
+        else:
+            speeds[0] = start - (start - end) * lag.sag
         first, middle, last = (
             self.forcing(*at, fault, held, parameters)
             for at in zip(times, lag.driving, speeds, lag.outputs, strict=True)
@@ -197,23 +205,23 @@ class Plant:
         stopped = rk4(derivative, self.stopped(state.body, start, parameters), (first, middle, last), dt)
         return PlantState(self.model.after_step(self.turning(stopped, end, parameters)), lag.outputs[-1])
 
-    def residual_speed(self, output: PerRotor, fault: RotorFault, parameters: PlantParameters) -> Scalar:
+    def residual_speed(self, output: PerRotor, fault: RotorFault, parameters: PlantParameters) -> Scalar | Vec3:
         """Omega of (4) in rad/s for lag outputs in N."""
         return residual_speed(parameters.vehicle, true_rotor_speeds(parameters.vehicle, output, fault))
 
-    def stopped(self, body: Any, residual: Scalar, parameters: PlantParameters) -> Any:
+    def stopped(self, body: Any, residual: Scalar | Vec3, parameters: PlantParameters) -> Any:
         """State of the body as it would be with its rotors stopped, Omega [rad/s] being what it is."""
-        return self.model.turned(body, rate_against_rotors(parameters.vehicle, residual))
+        return self.model.turned(body, turn_against_rotors(parameters.vehicle, residual))
 
-    def turning(self, stopped: Any, residual: Scalar, parameters: PlantParameters) -> Any:
+    def turning(self, stopped: Any, residual: Scalar | Vec3, parameters: PlantParameters) -> Any:
         """State of the body with its rotors turning, from that with its rotors stopped."""
-        return self.model.turned(stopped, -rate_against_rotors(parameters.vehicle, residual))
+        return self.model.turned(stopped, -turn_against_rotors(parameters.vehicle, residual))
 
     def forcing(
         self,
         time: Scalar,
         driving: PerRotor,
-        residual: Scalar,
+        residual: Scalar | Vec3,
         output: PerRotor,
         fault: RotorFault,
         held: Held,
@@ -226,7 +234,7 @@ class Plant:
         time : scalar, s
         driving : PerRotor, N
             What an integration step takes for the lag outputs.
-        residual : scalar, rad/s
+        residual : scalar or Vec3, rad/s
             Omega of (4).
         output : PerRotor, N
             Lag outputs.
@@ -238,11 +246,13 @@ class Plant:
             Numbers of the truth.
         """
         vehicle = parameters.vehicle
+        thrust = delivered_thrust(vehicle, driving, fault)
         return Forcing(
-            wrench_of(vehicle, delivered_thrust(vehicle, driving, fault)),
+            wrench_of(vehicle, thrust),
             residual,
             self.wind.at(time, held.wind, parameters.wind),
             () if vehicle.air == () else true_rotor_speeds(vehicle, output, fault),
+            () if vehicle.tilt == () else lateral_force(vehicle, thrust),
         )
 
     def derivative(self, stopped: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
@@ -265,6 +275,8 @@ class Plant:
             force_W, torque_B = pushed_by_air(vehicle, self.model.observe(body), forcing.air, forcing.speeds)
             wrench = Wrench(wrench.thrust, wrench.torque_B + torque_B)
             extra_W = extra_W + force_W / vehicle.mass
+        if isinstance(forcing.lateral_B, Vec3):
+            extra_W = extra_W + self.model.observe(body).q_WB.matrix() @ (forcing.lateral_B / vehicle.mass)
         if self.ground is not None:
             contact = self.ground.contact(self.model.observe(body), parameters.ground)
             wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
@@ -298,6 +310,9 @@ class Plant:
             contact = self.ground.contact(body, parameters.ground)
             pushed_W, ground_force = pushed_W + contact.force_W / vehicle.mass, contact.normal
         lift_B = Vec3(0.0, 0.0, wrench_of(vehicle, thrust).thrust / vehicle.mass)
+        lateral_B: Vec3 | tuple[()] = () if vehicle.tilt == () else lateral_force(vehicle, thrust)
+        if isinstance(lateral_B, Vec3):
+            lift_B = lift_B + lateral_B / vehicle.mass
         return Truth(
             state=body,
             specific_force_B=lift_B + body.q_WB.matrix().T @ pushed_W,
@@ -306,6 +321,7 @@ class Plant:
             loss=true_loss(vehicle, state.rotors, fault),
             air=air,
             ground_force=ground_force,
+            lateral_B=lateral_B,
         )
 
     def fault(self, time: Scalar, held: Held, parameters: PlantParameters) -> RotorFault:

@@ -17,7 +17,7 @@ from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.signals import State, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant.models import BodyModel, acceleration
+from rotorfault.plant.models import BodyModel, about_z, acceleration
 from rotorfault.plant.wind import Air
 
 
@@ -45,7 +45,7 @@ class RigidBody(BodyModel[RigidBodyState]):
         wrench: Wrench,
         extra_acceleration_W: Vec3,
         vehicle: Vehicle,
-        residual_speed: Scalar,
+        residual_speed: Scalar | Vec3,
         air: Air,
     ) -> RigidBodyState:
         """Time derivative; see `rotorfault.plant.models.BodyModel`."""
@@ -58,9 +58,9 @@ class RigidBody(BodyModel[RigidBodyState]):
             omega_B=angular_acceleration(vehicle, wrench.torque_B, body.omega_B, residual_speed),
         )
 
-    def turned(self, body: RigidBodyState, rate: Scalar) -> RigidBodyState:
-        """The state with its rate about body z changed by so much [rad/s]."""
-        return body._replace(omega_B=body.omega_B + Vec3(0.0, 0.0, rate))
+    def turned(self, body: RigidBodyState, rate: Scalar | Vec3) -> RigidBodyState:
+        """The state with its rate about body z, or all body rates, changed by so much [rad/s]."""
+        return body._replace(omega_B=body.omega_B + about_z(rate))
 
     def after_step(self, body: RigidBodyState) -> RigidBodyState:
         """Bring the quaternion back to unit length, which integration keeps only to its own order."""

@@ -12,9 +12,17 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, cast
+from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
-from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.response import ON_FAULT
@@ -24,8 +32,11 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.model.block import TimeGrid
+from rotorfault.model.quantities import one_or_each, plain
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle_changes import Factor as RotorFactor
+from rotorfault.model.vehicle_changes import with_factors
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
@@ -40,6 +51,9 @@ ROUNDING = 1e-12  # relative, of a time over another
 PERIOD_TOLERANCE = 1e-9  # relative: how exactly the step must divide the sampling period
 MOST_SEED = 10**12
 MOST_SUBSTEPS = 1000  # per sampling period
+MOST_SHIFT = 10.0  # m, of a centre of mass: more is no mismatch
+ROTOR_FACTORS = ("rotor_bandwidth", "rotor_gain", "thrust_max", "thrust_coefficient", "torque_ratio")
+"""Of a mismatch: one number, or one for each rotor."""
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
 
@@ -73,14 +87,46 @@ class Start(Strict):
 Factor = Annotated[float, Field(gt=0.0)]
 
 
+def _factors(value: object) -> float | tuple[float, ...]:
+    found = one_or_each(value)
+    for factor in found if isinstance(found, tuple) else (found,):
+        if not factor > 0.0:
+            raise refusal(
+                "", f"got {factor!r}; allowed: greater than 0, one number or a list with one for each rotor"
+            )
+    return found
+
+
+class EachRotor(NamedTuple):
+    """Marks a setting that may be one number or a list with one for each rotor; for readers."""
+
+    gt: float  # that each is greater than
+
+
+Factors = Annotated[
+    float | tuple[float, ...],
+    PlainValidator(_factors),
+    PlainSerializer(plain, return_type=float | list[float]),
+    EachRotor(0.0),
+]
+"""One for all rotors, or one for each."""
+Shift = Annotated[float, Field(ge=-MOST_SHIFT, le=MOST_SHIFT)]
+
+
 class Mismatch(Strict):
     """Factors on the true vehicle that the autopilot does not know of: 1.1 is ten percent more than believed."""
 
     mass: Factor = 1.0
     inertia: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
-    rotor_bandwidth: Factor = 1.0
-    rotor_gain: Factor = 1.0
+    rotor_bandwidth: Factors = 1.0
+    rotor_gain: Factors = 1.0
+    thrust_max: Factors = 1.0
+    thrust_coefficient: Factors = 1.0
+    torque_ratio: Factors = 1.0
     linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
+    centre_of_mass: tuple[Shift, Shift, Shift] = Field(
+        default=(0.0, 0.0, 0.0), description="true less believed centre of mass: forward, left, up [m]"
+    )
 
     def applied(self, vehicle: VehicleFile) -> Vehicle:
         """The true vehicle for a believed one.
@@ -91,10 +137,12 @@ class Mismatch(Strict):
             If there is no such vehicle: it keeps the rules of a vehicle file.
         """
         x, y, z = self.inertia
-        factors = {name: getattr(self, name) for name in ("mass", "rotor_bandwidth", "rotor_gain", "linear_drag")}
+        factors: dict[str, RotorFactor] = {
+            name: getattr(self, name) for name in ("mass", *ROTOR_FACTORS, "linear_drag")
+        }
         factors |= {"inertia_x": x, "inertia_y": y, "inertia_z": z}
         try:
-            return vehicle.with_factors(factors).vehicle
+            return with_factors(vehicle, factors, self.centre_of_mass).vehicle
         except PydanticCustomError as error:
             about = error.context or {}
             raise refusal("mismatch", f"the true vehicle: {about.get('key')}: {error.message()}") from None

@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from rotorfault.model.slot import Slot
 from rotorfault.scenario.part import Part
-from rotorfault.scenario.scenario import Mismatch, Start, scenario_fields
+from rotorfault.scenario.scenario import EachRotor, Mismatch, Start, scenario_fields
 from rotorfault.scenario.slots import SLOTS
 
 
@@ -103,6 +103,8 @@ def _allowed(field: FieldInfo) -> str:
     if get_origin(kind) in (Union, types.UnionType) and len(options) == 1:
         kind, options = options[0], []
     bounds = _bounds(field.metadata)
+    if any(isinstance(mark, EachRotor) for mark in field.metadata):
+        return f"number{bounds}, or a list with one for each rotor"
     if kind is bool:
         return "`true`, `false`"
     if kind is str:
@@ -140,8 +142,8 @@ def scenario_settings() -> Iterator[Setting]:
     for name, field in scenario_fields().items():
         if name in inside:
             for setting in settings(inside[name], f"{name}."):
-                factor = f"factor on the true {setting.meaning}" if name == "mismatch" else setting.meaning
-                yield setting._replace(meaning=factor)
+                factor = name == "mismatch" and setting.key != "mismatch.centre_of_mass"
+                yield setting._replace(meaning=f"factor on the true {setting.meaning}") if factor else setting
         elif name in SLOTS:
             yield _slot_setting(SLOTS[name], field)
         elif name == "vehicle":

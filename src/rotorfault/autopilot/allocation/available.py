@@ -13,7 +13,7 @@ frames both are found by active sets (see `nearest`), from rotors at their least
 from __future__ import annotations
 
 from rotorfault.autopilot.allocation.nearest import limits_of, most_thrust
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import in_pairs
@@ -48,7 +48,7 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = Non
     effect = effect_of(vehicle, loss, stuck)
     high = effect * vehicle.thrust_max + stuck.thrust
     if vehicle.pairs == ():
-        share = effect * (1.0 / vehicle.rotor_gain)
+        share = effect * per_rotor(lambda gain: 1.0 / gain, vehicle.rotor_gain)
         limits = limits_of(effect * vehicle.thrust_min + stuck.thrust, high, share)
         with_yaw, without_yaw = most_thrust(effectiveness(vehicle), limits, STEPS)
         return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))

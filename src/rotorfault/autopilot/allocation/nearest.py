@@ -17,6 +17,9 @@ keeps what has been reached. The rows of B and R have length 1, and :math:`\epsi
 from below: nothing near singular is inverted, however few rotors are left, and a direction in which the free rotors
 can hardly move is not taken (`LEAST_GAIN`).
 
+Tilted rotors begin with thrusts of little lateral force besides (`rotorfault.model.effectiveness.eased`); where that
+is beyond a limit, what is made up for is the demand alone.
+
 Source of the problem, and of active sets for it: M. Bodson, "Evaluation of optimization methods for control
 allocation", J. Guid. Control Dyn. 25(4), 2002; O. Harkegard, "Efficient active set algorithms for solving constrained
 least squares problems in aircraft control allocation", CDC 2002. How near a fixed number of steps comes to linear
@@ -41,7 +44,7 @@ from rotorfault.maths.scalar import (
     select,
     sqrt,
 )
-from rotorfault.model.effectiveness import WrenchRows
+from rotorfault.model.effectiveness import LateralRows, WrenchRows, eased
 from rotorfault.model.signals import Wrench
 
 PIVOT = 1e-9  # of rows of length 1, squared: epsilon
@@ -90,7 +93,13 @@ def limits_of(low: PerRotor, high: PerRotor, share: PerRotor) -> Limits:
     return Limits(low, high, share * share, AT_LIMIT * (high - low).reduce(maximum))
 
 
-def nearest(matrix: WrenchRows, demand: Wrench, limits: Limits, steps: Steps = STEPS) -> PerRotor:
+def nearest(
+    matrix: WrenchRows,
+    demand: Wrench,
+    limits: Limits,
+    steps: Steps = STEPS,
+    lateral: LateralRows | tuple[()] = (),
+) -> PerRotor:
     """Thrusts in N within their limits, whose wrench is nearest to a demand.
 
     Parameters
@@ -101,6 +110,8 @@ def nearest(matrix: WrenchRows, demand: Wrench, limits: Limits, steps: Steps = S
         Thrust [N] and torque [N m, body axes].
     limits : Limits
     steps : Steps
+    lateral : LateralRows, optional
+        Of tilted rotors.
 
     Returns
     -------
@@ -113,9 +124,7 @@ def nearest(matrix: WrenchRows, demand: Wrench, limits: Limits, steps: Steps = S
         x / length for x, length in zip((demand.thrust, *demand.torque_B), lengths, strict=True)
     )
     rows = (up, roll, pitch, yaw)
-    left = [d - row.dot(limits.low) for d, row in zip((T, tau_x, tau_y, tau_z), rows, strict=True)]
-    y = _solved(rows, limits.weight, left)
-    thrust = (limits.low + _combined(rows, y) * limits.weight).map(clip, limits.low, limits.high)
+    thrust = _beginning(rows, (T, tau_x, tau_y, tau_z), limits, lateral).map(clip, limits.low, limits.high)
 
     # Tilt, along what is missing of it and with nothing added across.
     x, z = tau_x - roll.dot(thrust), tau_y - pitch.dot(thrust)
@@ -127,6 +136,20 @@ def nearest(matrix: WrenchRows, demand: Wrench, limits: Limits, steps: Steps = S
     thrust = pushed(thrust, Push(up, (roll, pitch)), missing, limits, steps.thrust)
     missing = tau_z - yaw.dot(thrust)
     return pushed(thrust, Push(yaw, (roll, pitch, up)), missing, limits, steps.yaw)
+
+
+def _beginning(
+    rows: tuple[PerRotor, ...], demands: tuple[Scalar, ...], limits: Limits, lateral: LateralRows | tuple[()]
+) -> PerRotor:
+    """Thrusts in N that meet the demands with the least sum of squares, and little lateral force, limits or not."""
+    weight = limits.weight
+    if not isinstance(lateral, LateralRows):
+        left = [d - row.dot(limits.low) for d, row in zip(demands, rows, strict=True)]
+        return limits.low + _combined(rows, _solved(rows, weight, left)) * weight
+    begun = eased(limits.low, lateral, weight)
+    columns = tuple(eased(row * weight, lateral, weight) for row in rows)
+    left = [d - row.dot(begun) for d, row in zip(demands, rows, strict=True)]
+    return begun + _combined(columns, _factored(rows, columns, left))
 
 
 def pushed(thrust: PerRotor, push: Push, missing: Scalar, limits: Limits, steps: int) -> PerRotor:
@@ -194,8 +217,12 @@ def _combined(rows: tuple[PerRotor, ...], factors: list[Scalar]) -> PerRotor:
 
 
 def _solved(rows: tuple[PerRotor, ...], weight: PerRotor, right: list[Scalar]) -> list[Scalar]:
-    """Solution of (rows diag(weight) rows' + epsilon I) x = right, by L D L'."""
-    weighted = [row * weight for row in rows]
+    """Solution of (rows diag(weight) rows' + epsilon I) x = right."""
+    return _factored(rows, tuple(row * weight for row in rows), right)
+
+
+def _factored(rows: tuple[PerRotor, ...], weighted: tuple[PerRotor, ...], right: list[Scalar]) -> list[Scalar]:
+    """Solution of (weighted rows' + epsilon I) x = right, symmetric, by L D L'."""
     lower: list[list[Scalar]] = []
     pivots: list[Scalar] = []
     x: list[Scalar] = []
@@ -237,4 +264,4 @@ def most_thrust(matrix: WrenchRows, limits: Limits, steps: int) -> tuple[Scalar,
     endless = limits.high.sum()
     balanced = pushed(limits.low, Push(up, tuple(torques)), endless, limits, steps)
     turning = pushed(balanced, Push(up, tuple(torques[:2])), endless, limits, steps)
-    return balanced.sum(), turning.sum()
+    return matrix.thrust.dot(balanced), matrix.thrust.dot(turning)

@@ -43,10 +43,10 @@ from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
 from rotorfault.model.block import Context, Record
-from rotorfault.model.motion import drag_acceleration
+from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Vehicle, body_momentum, wrench_of
 
 
 class CascadeSettings(Strict):
@@ -179,7 +179,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         """One sampling instant."""
         estimate, reference, vehicle, believed = inputs.estimate, inputs.reference, inputs.vehicle, inputs.diagnosis
         six_inputs = self.settings.six_inputs
-        w0 = vehicle.rotor_bandwidth
+        w0 = mean_bandwidth(vehicle)
         R_WB = estimate.q_WB.matrix()
 
         # Position loop: specific force wanted.
@@ -213,7 +213,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
         torque_B = self.tracking.ahead_of_lag(
-            (inner.u + attitude.feed_forward).times(vehicle.inertia),
+            body_momentum(vehicle, inner.u + attitude.feed_forward),
             wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B,
             estimate.omega_B,
             w0,

@@ -35,7 +35,7 @@ class ControlInputs(NamedTuple):
     command: PerRotor  # N, sent at the last instant
     expected_thrust: PerRotor  # N: of sound rotors now; of the believed ones it is times 1 - loss
     prediction: Prediction
-    residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
+    residual_speed: Scalar | Vec3  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
 
     def __repr__(self) -> str:

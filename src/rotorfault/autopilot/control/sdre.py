@@ -22,7 +22,7 @@ from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, sqrt
 from rotorfault.model.block import Context, Nothing
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, inertia_matrix, rotor_momentum
 
 
 class Weights(Strict):
@@ -82,11 +82,18 @@ def sdre_parameters(weights: Weights) -> SdreParameters:
     )
 
 
-def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) -> Mat3:
+def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar | Vec3) -> Mat3:
     """W(omega) of the SDC form in 1/s: omega_dot = W(omega) omega + J^{-1} tau, rows as in (3).
 
-    Each product of two rates is shared half and half between them; the rotor term is linear in one rate already.
+    Each product of two rates is shared half and half between them; the rotor term is linear in one rate already. With
+    S(v) u = v x u it is J^{-1}(S(h) - (S(omega) J - S(J omega)) / 2) for any inertia matrix and any momentum h of the
+    rotors.
     """
+    if vehicle.inertia_products != () or isinstance(residual_speed, Vec3):
+        matrix, momentum = inertia_matrix(vehicle), rotor_momentum(vehicle, residual_speed)
+        h = momentum if isinstance(momentum, Vec3) else Vec3(0.0, 0.0, momentum)
+        turning = Mat3.skew(omega_B) @ matrix - Mat3.skew(matrix @ omega_B)
+        return matrix.inverse() @ (Mat3.skew(h) - turning * 0.5)
     J = vehicle.inertia
     a1, a3, a5 = (J.y - J.z) / J.x, (J.z - J.x) / J.y, (J.x - J.y) / J.z
     rotor = vehicle.rotor_inertia * residual_speed

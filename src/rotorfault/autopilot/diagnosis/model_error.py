@@ -36,7 +36,7 @@ from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, absolute, less, maximum, minimum, sqrt
 from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
-from rotorfault.model.motion import limited
+from rotorfault.model.motion import lag_bandwidth, limited
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds, wrench_of
 
@@ -133,8 +133,12 @@ def follow(
     dynamics : Dynamics
     """
     elapsed, kept = expectation.elapsed, 1.0 - dynamics.gain_rate
-    ahead = limited(vehicle, command) * vehicle.rotor_gain - expectation.thrust
-    lag = memory.lag * dynamics.lag_decay + ahead * (vehicle.rotor_bandwidth * elapsed)
+    entering = limited(vehicle, command)
+    ahead = entering * vehicle.rotor_gain - expectation.thrust
+    bandwidth = vehicle.rotor_bandwidth
+    if not isinstance(vehicle.rotor_bandwidth_down, tuple):
+        bandwidth = lag_bandwidth(vehicle, expectation.thrust / vehicle.rotor_gain, entering)
+    lag = memory.lag * dynamics.lag_decay + ahead * (bandwidth * elapsed)
 
     lag_innovation = memory.lag_innovation * kept + (lag - memory.lagging) * elapsed
     turned = expectation.now.omega_B - expectation.previous.omega_B
@@ -144,7 +148,7 @@ def follow(
     # A rotor that runs ahead of its model has also turned the body further the other way. Its speed is a root of its
     # thrust, so the difference is that of a share as large as bandwidths are wrong by.
     ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
-    ran_ahead = residual_speed(vehicle, ahead_of_model) - expectation.residual_speed
+    ran_ahead = _about_z(residual_speed(vehicle, ahead_of_model) - expectation.residual_speed)
     reaction = -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
     # On a vehicle without a reaction, which is known before the flight, nothing is remembered of it, and it is free.
     there = less(0.0, vehicle.rotor_reaction)
@@ -174,6 +178,11 @@ def follow(
     )
 
 
+def _about_z(residual: Scalar | Vec3) -> Scalar:
+    """Of a residual speed what lies along body z, where one torque matters most."""
+    return residual.z if isinstance(residual, Vec3) else residual
+
+
 class Misstated(NamedTuple):
     """Squares of the thrust by which a sound rotor may seem to fall behind others because the model is wrong."""
 
@@ -201,7 +210,7 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
     arm_12 = absolute(roll.D12) * torque.x + absolute(pitch.D12) * torque.y
     arm_34 = absolute(roll.D34) * torque.x + absolute(pitch.D34) * torque.y
     about_yaw = absolute(yaw.S12 - yaw.S34)
-    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    unlike = absolute(rate_against_rotors(vehicle, _about_z(residual_speed(vehicle, memory.spinning * flagged))))
     turned = 0.5 * (arm_12 + arm_34 + about_yaw * (torque.z + inertia.z * unlike))
     reacted = 0.5 * about_yaw * inertia.z * absolute(memory.reacting)
     least, most = memory.lagging.reduce(minimum), memory.lagging.reduce(maximum)
@@ -245,7 +254,7 @@ def torque_variances(
     inertia = vehicle.inertia
     squared = inertia.times(inertia) * (dynamics.noise_gain * dynamics.noise_gain)
     lagging = wrench_of(vehicle, memory.lagging).torque_B
-    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    unlike = absolute(rate_against_rotors(vehicle, _about_z(residual_speed(vehicle, memory.spinning * flagged))))
     own = Vec3(0.0, 0.0, inertia.z * unlike)
     reacted = Vec3(0.0, 0.0, inertia.z * absolute(memory.reacting))
     wrong = [

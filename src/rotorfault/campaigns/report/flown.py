@@ -186,15 +186,13 @@ def _vehicles(study: Study, names: Collection[str]) -> list[str]:
 
 def _vehicle(file: VehicleFile, mismatch: Mismatch) -> str:
     vehicle = file.vehicle
-    lift = vehicle.thrust_max * vehicle.rotor_gain * vehicle.rotors / (vehicle.mass * vehicle.gravity)
-    text = f"{file.name}: {vehicle.mass:.3g} kg, thrust-to-weight ratio {lift:.3g}"
+    text = f"{file.name}: {vehicle.mass:.3g} kg, thrust-to-weight ratio {file.thrust_to_weight:.3g}"
     text += f"; {file.description}" if file.description else ""
-    other = {
-        name: value
-        for name, value in mismatch.model_dump(mode="json").items()
-        if np.any(np.asarray(value, dtype=float) != 1.0)
-    }
-    return f"{text}; the true one differs from it by factors: {_settings(other)}" if other else text
+    factors = mismatch.model_dump(mode="json")
+    shift = factors.pop("centre_of_mass")
+    other = {name: value for name, value in factors.items() if np.any(np.asarray(value, dtype=float) != 1.0)}
+    text += f"; the true one differs from it by factors: {_settings(other)}" if other else ""
+    return f"{text}; its true centre of mass is {shift} m beside the believed one" if any(shift) else text
 
 
 def _scenario(study: Study) -> tuple[str, ...]:

@@ -85,6 +85,10 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
     InputError
         If ArduPilot has no frame with motors near its rotors that turn so.
     """
+    if vehicle.rotor_set.tilted:
+        raise InputError(
+            f"{vehicle.name}: has tilted rotors, and no frame of ArduPilot has any; export to px4, which takes them"
+        )
     fits = {
         name: numbers for name in BY_NUMBERS.values() if (numbers := number_of(vehicle, FRAMES[name])) is not None
     }
@@ -97,8 +101,7 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
     # The nearest; of those that are as near, the one that counts the motors as the vehicle does.
     best = min(fits, key=lambda name: (round(distance(vehicle, FRAMES[name], fits[name]), 3), fits[name] != order))
     kind, type_ = next(numbers for numbers, name in BY_NUMBERS.items() if name == best)
-    weight = vehicle.mass.value * vehicle.gravity.value
-    hover = weight / (len(vehicle.rotor) * vehicle.rotor_gain.value * vehicle.thrust_max.value)
+    hover = 1.0 / vehicle.thrust_to_weight
     motors = ", ".join(f"{rotor} is motor {number}" for rotor, number in enumerate(fits[best], start=1))
     lines = [
         f"# Vehicle '{vehicle.name}', written by rotorfault for ArduPilot: frame {best}, thrust in hover, no gains.",

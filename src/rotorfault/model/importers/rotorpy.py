@@ -38,8 +38,7 @@ OPERATIONS = {
 }
 LEFT_OUT = {
     "k_z": "inflow", "k_h": "translational lift", "k_flap": "flapping", "c_Dx": "quadratic drag",
-    "c_Dy": "quadratic drag", "c_Dz": "quadratic drag", "Ixy": "products of inertia", "Ixz": "products of inertia",
-    "Iyz": "products of inertia",
+    "c_Dy": "quadratic drag", "c_Dz": "quadratic drag",
 }  # fmt: skip
 """Numbers of RotorPy that the model has no place for."""
 
@@ -191,9 +190,10 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
     if any(abs(sign) != 1.0 for sign in signs):
         raise InputError(f"{where}: rotor_directions is {signs}; allowed: 1 and -1")
     heights = levels((x, y, z) for x, y, z in places)
+    high = any(abs(z) > 1e-9 for _, _, z in places)
     rotors = tuple(
-        SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level)
-        for name, (x, y, _), sign, level in zip(positions, places, signs, heights, strict=True)
+        SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level, z if high else None)
+        for name, (x, y, z), sign, level in zip(positions, places, signs, heights, strict=True)
     )
     known: dict[str, Quantity] = {}
 
@@ -206,6 +206,9 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
     mass = take("mass", "mass")
     for axis in "xyz":
         take(f"inertia_{axis}", f"I{axis * 2}")
+    for axes in ("xy", "xz", "yz"):
+        if _number(found, f"I{axes}", where):
+            take(f"inertia_{axes}", f"I{axes}")
     thrust, torque = take("thrust_coefficient", "k_eta"), _number(found, "k_m", where)
     if thrust and torque is not None:
         take("torque_ratio", "k_m", " over k_eta", torque / thrust)
@@ -226,8 +229,6 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
             float(f"{drag * total:.4g}"),
         )
     left = sorted({LEFT_OUT[name] for name in LEFT_OUT if _number(found, name, where)})
-    if any(abs(z) > 1e-9 for _, _, z in places):
-        left.append("heights of the rotors")
     notes = (f"Left out, for the model has none of it: {', '.join(left)}.",) if left else ()
     return Draft(where, f"{where}, parameters of RotorPy", rotors, known, notes=notes)
 
