@@ -18,7 +18,8 @@ def vehicle_text(
     description: str,
     head: Iterable[str],
     numbers: Sequence[tuple[str, Quantity]],
-    rotors: Iterable[tuple[str, float, float, str, str]],
+    rotors: Iterable[tuple[str, float, float, float, str, str]],
+    air: Sequence[tuple[str, Quantity]] = (),
 ) -> str:
     """The text of a vehicle file.
 
@@ -29,8 +30,10 @@ def vehicle_text(
         What stands above it all as a comment, a paragraph each.
     numbers : sequence of (str, Quantity)
         By key, in the order of the file.
-    rotors : iterable of (str, float, float, str, str)
-        Name, x and y in m, "+" or "-" for the yaw torque, source of the place.
+    rotors : iterable of (str, float, float, float, str, str)
+        Name, x, y and z in m, "+" or "-" for the yaw torque, source of the place.
+    air : sequence of (str, Quantity), optional
+        Numbers of the table ``[air]``, by key.
     """
     lines = []
     for paragraph in head:
@@ -40,9 +43,12 @@ def vehicle_text(
     for key, quantity in numbers:
         lines += [""] * (key in BREAKS)
         lines.append(f"{key} = {_inline(quantity)}")
-    for label, x, y, yaw, source in rotors:
+    lines += ["", "[air]"] if air else []
+    lines += [f"{key} = {_inline(quantity)}" for key, quantity in air]
+    for label, x, y, z, yaw, source in rotors:
         lines += ["", "[[rotor]]", f"name = {_text(label)}"]
-        for key, value in (("x", x), ("y", y)):
+        # A height is there for what the air does alone, and 0 if not given.
+        for key, value in (("x", x), ("y", y), *((("z", z),) if z else ())):
             lines.append(f"{key} = {_inline(Quantity(value=value, unit='m', source=source))}")
         lines.append(f"yaw = {_text(yaw)}")
     return "\n".join(lines) + "\n"

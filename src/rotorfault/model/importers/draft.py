@@ -51,6 +51,7 @@ class SourceRotor(NamedTuple):
     clockwise: bool  # whether its propeller turns so, seen from above
     source: str  # of the place
     level: str = ""  # "upper" or "lower" of two on one arm, where the source says it; else ""
+    z: float = 0.0  # m, above the centre of mass, where what the air does asks for it
 
     @property
     def label(self) -> str:
@@ -71,6 +72,7 @@ class Draft(NamedTuple):
     hover_share: tuple[float, str] | None = None  # thrust in hover over the greatest thrust, and its source
     least_share: tuple[float, str] | None = None  # least thrust over the greatest, and its source
     notes: tuple[str, ...] = ()  # what of the source is left out, a line each
+    air: tuple[tuple[str, Quantity], ...] = ()  # what the air does beyond linear drag, by key of the table [air]
 
 
 class Imported(NamedTuple):
@@ -123,9 +125,10 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
         [f"Made by rotorfault from {draft.about}.", *draft.notes],
         [(key, numbers[key]) for key in UNITS],
         [
-            (rotor.label, rotor.x, rotor.y, "+" if rotor.clockwise else "-", rotor.source)
+            (rotor.label, rotor.x, rotor.y, rotor.z, "+" if rotor.clockwise else "-", rotor.source)
             for rotor in rotors
         ],
+        draft.air,
     )  # fmt: skip
     file = validate(VehicleFile, parse_toml(text, draft.where), draft.where)
     return Imported(file, text, rotors, draft.notes, tuple(estimated))
