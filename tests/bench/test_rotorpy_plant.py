@@ -1,4 +1,4 @@
-"""RotorPy's Hummingbird with its full aerodynamics: in RotorPy and here, by the same commands and by one autopilot."""
+"""RotorPy's Hummingbird with its full aerodynamics: in RotorPy and here, by the same commands and one autopilot."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Apart(NamedTuple):
 
 
 def flight(vehicle: VehicleFile, **tables: Any) -> Scenario:
-    """Three seconds between waypoints in a wind, sideways and up by metres, with a loss of 30 % of one rotor after one.
+    """Three seconds between waypoints in a wind, metres sideways and up, with a loss of 30 % of one rotor after one.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def busy_commands(vehicle: VehicleFile, steps: int, period: float, seed: int) ->
 
 
 def moving_start(seed: int) -> tuple[Vec3, Vec3, Vec3, Vec3]:
-    """A start in fast flight, tilted and turning: position, velocity, roll, pitch and yaw, body rates, in SI units."""
+    """A start in fast flight, tilted and turning: position, velocity, roll, pitch and yaw, body rates, in SI."""
     rng = np.random.default_rng(seed)
     sizes = (2.0, 4.0, 0.5, 1.5)
     position, velocity, attitude, rates = (Vec3.of((size * rng.normal(size=3)).tolist()) for size in sizes)

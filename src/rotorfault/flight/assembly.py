@@ -27,7 +27,7 @@ from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Context, Record
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.slot import Slot
-from rotorfault.model.vehicle import in_air
+from rotorfault.model.vehicle import alike
 from rotorfault.plant.ground import GROUND
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
@@ -264,8 +264,8 @@ class _Assembly:
                 about = f"flight {self.flights[np.argmax(inverse == number)]}"
                 true = true_vehicle(vehicle, mismatch[0], self.scenario.grid, about) if mismatch else vehicle.vehicle
                 made.append(Context(true, period))
-            if any(one.vehicle.air for one in made):
-                made = [one._replace(vehicle=in_air(one.vehicle)) for one in made]
+            same = alike([one.vehicle for one in made])
+            made = [one._replace(vehicle=vehicle) for one, vehicle in zip(made, same, strict=True)]
             # One loop for all: what has a closed form for some of them only is not used for any.
             if any(context.vehicle.pairs != made[0].vehicle.pairs for context in made):
                 made = [context._replace(vehicle=context.vehicle._replace(pairs=())) for context in made]

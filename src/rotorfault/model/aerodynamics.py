@@ -19,6 +19,7 @@ how fast it spins when yaw is given up.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from rotorfault.base.one_line import record_line
@@ -48,7 +49,13 @@ def still_air(rotors: int) -> Aerodynamics:
 
 
 def air_wrench(
-    air: Aerodynamics, rotor_x: PerRotor, rotor_y: PerRotor, speeds: PerRotor, airspeed_B: Vec3, omega_B: Vec3
+    air: Aerodynamics,
+    rotor_x: PerRotor,
+    rotor_y: PerRotor,
+    speeds: PerRotor,
+    airspeed_B: Vec3,
+    omega_B: Vec3,
+    gusts_B: Sequence[Vec3] = (),
 ) -> tuple[Vec3, Vec3]:
     """Force in N and torque in N m of the air on the vehicle, body axes.
 
@@ -63,11 +70,14 @@ def air_wrench(
         Velocity of the vehicle against the air, body axes.
     omega_B : Vec3, rad/s
         Body rates.
+    gusts_B : sequence of Vec3, m/s
+        By how much faster the air is at each rotor than at the centre of mass, body axes; empty for not at all.
     """
     force, torque = zeros(), zeros()
-    for x, y, z, speed in zip(rotor_x, rotor_y, air.rotor_z, speeds, strict=True):
+    for i, (x, y, z, speed) in enumerate(zip(rotor_x, rotor_y, air.rotor_z, speeds, strict=True)):
         place, size = Vec3(x, y, z), absolute(speed)
         v = airspeed_B + omega_B.cross(place)
+        v = v - gusts_B[i] if gusts_B else v
         lift = air.translational_lift * (v.x * v.x + v.y * v.y)
         pull = Vec3(-air.rotor_drag * size * v.x, -air.rotor_drag * size * v.y, lift - air.inflow * size * v.z)
         flap = air.flapping * size

@@ -94,6 +94,7 @@ class Vehicle(NamedTuple):
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
     air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
+    rotor_radius: Scalar | tuple[()] = ()  # m: near the ground thrust grows by it; empty where it does not
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
 
     @property
@@ -105,9 +106,19 @@ class Vehicle(NamedTuple):
         return record_line(self)
 
 
-def in_air(vehicle: Vehicle) -> Vehicle:
-    """The same vehicle with coefficients of the air, all 0 if it has none."""
-    return vehicle if vehicle.air != () else vehicle._replace(air=still_air(vehicle.rotors))
+def alike(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
+    """The same vehicles as records of one shape: each has what any of them has, as 0 if it has none of it."""
+    found = list(vehicles)
+    if any(one.air != () for one in found):
+        found = [one if one.air != () else one._replace(air=still_air(one.rotors)) for one in found]
+    if any(one.rotor_radius != () for one in found):
+        found = [one if one.rotor_radius != () else one._replace(rotor_radius=0.0) for one in found]
+    return found
+
+
+def rotor_z(vehicle: Vehicle) -> PerRotor:
+    """Heights in m of the rotors above the centre of mass; 0 where they are not given."""
+    return vehicle.air.rotor_z if isinstance(vehicle.air, Aerodynamics) else PerRotor.all(0.0, vehicle.rotors)
 
 
 def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:

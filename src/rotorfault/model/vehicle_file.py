@@ -73,6 +73,9 @@ class VehicleFile(Strict):
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
     )
+    rotor_radius: Annotated[Quantity, positive("m")] | None = Field(
+        default=None, description="m, radius of the rotors: with it thrust grows near the ground"
+    )
     air: AirFile | None = Field(default=None, description="what the air does beyond linear drag")
     rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
@@ -249,6 +252,7 @@ class VehicleFile(Strict):
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
             air=self._aerodynamics(),
+            rotor_radius=() if self.rotor_radius is None else self.rotor_radius.value,
             pairs=self.pairs or (),
         )
 

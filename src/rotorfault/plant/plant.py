@@ -4,7 +4,8 @@ The command is held over the period, and so are the memories of wind and faults.
 and drives the body, which is integrated (`rotorfault.plant.rotors`). Wind is taken at the stage times of the
 integrator; faults act over each sub-step with their mean over it, so that one that sets in on a sub-step's boundary
 acts exactly from there on and never costs the integrator its order.
-Ground is a choice of structure: a flight without it has none of its operations.
+Ground is a choice of structure: a flight without it has none of its operations. With it, rotors whose radius is known
+give more thrust near it (`rotorfault.plant.ground_effect`).
 
 A rotor that speeds up turns the body the other way: what only outside torques change is J_z r + J_r Omega, body and
 rotors together. So that is integrated, as the rate about body z that the body would have if its rotors were stopped
@@ -20,12 +21,13 @@ from typing import Any, NamedTuple, final
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
+from rotorfault.plant.air_forces import air_around, pushed_by_air
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
 from rotorfault.plant.ground import Ground
+from rotorfault.plant.ground_effect import thrust_near_ground, with_ground_effect
 from rotorfault.plant.integrator import rk4
 from rotorfault.plant.models import BodyModel
 from rotorfault.plant.rotors import delivered_thrust, lag_step, true_loss, true_rotor_speeds
@@ -74,6 +76,8 @@ class Forcing(NamedTuple):
     residual_speed: Scalar  # rad/s
     air: Air
     speeds: PerRotor | tuple[()] = ()  # rad/s, of the rotors; empty where the air does not ask for them
+    thrust: PerRotor | tuple[()] = ()  # N, far from the ground; empty where there is no ground effect
+    blown: tuple[Scalar, Any] | tuple[()] = ()  # s and memory of a wind that differs from place to place; else empty
 
 
 @final
@@ -238,11 +242,14 @@ class Plant:
             Numbers of the truth.
         """
         vehicle = parameters.vehicle
+        thrust = delivered_thrust(vehicle, driving, fault)
         return Forcing(
-            wrench_of(vehicle, delivered_thrust(vehicle, driving, fault)),
+            wrench_of(vehicle, thrust),
             residual,
             self.wind.at(time, held.wind, parameters.wind),
             () if vehicle.air == () else true_rotor_speeds(vehicle, output, fault),
+            () if self.ground is None or vehicle.rotor_radius == () else thrust,
+            (time, held.wind) if self.wind.in_space() else (),
         )
 
     def derivative(self, stopped: Any, forcing: Forcing, command: Command, parameters: PlantParameters) -> Any:
@@ -261,15 +268,22 @@ class Plant:
         """
         vehicle, wrench, extra_W = parameters.vehicle, forcing.wrench, command.direct_acceleration_W
         body = self.turning(stopped, forcing.residual_speed, parameters)
+        air, local_W = air_around(
+            self.wind, vehicle, self.model.observe(body), forcing.air, forcing.blown, parameters.wind
+        )
         if isinstance(forcing.speeds, PerRotor):
-            force_W, torque_B = pushed_by_air(vehicle, self.model.observe(body), forcing.air, forcing.speeds)
+            force_W, torque_B = pushed_by_air(vehicle, self.model.observe(body), air, forcing.speeds, local_W)
             wrench = Wrench(wrench.thrust, wrench.torque_B + torque_B)
             extra_W = extra_W + force_W / vehicle.mass
         if self.ground is not None:
-            contact = self.ground.contact(self.model.observe(body), parameters.ground)
+            state = self.model.observe(body)
+            if isinstance(forcing.thrust, PerRotor):
+                near = thrust_near_ground(vehicle, forcing.thrust, state, self.ground.surface(parameters.ground))
+                wrench = with_ground_effect(vehicle, wrench, forcing.thrust, near)
+            contact = self.ground.contact(state, parameters.ground)
             wrench = Wrench(wrench.thrust, wrench.torque_B + contact.torque_B)
             extra_W = extra_W + contact.force_W / vehicle.mass
-        return self.model.derivative(body, wrench, extra_W, vehicle, forcing.residual_speed, forcing.air)
+        return self.model.derivative(body, wrench, extra_W, vehicle, forcing.residual_speed, air)
 
     def observe(self, state: PlantState, held: Held, air: Air, time: Scalar, parameters: PlantParameters) -> Truth:
         """The truth at a sampling instant.
@@ -289,14 +303,18 @@ class Plant:
         vehicle, fault = parameters.vehicle, self.fault(time, held, parameters)
         body = self.model.observe(state.body)
         thrust = delivered_thrust(vehicle, state.rotors, fault)
+        blown = (time, held.wind) if self.wind.in_space() else ()
+        air, local_W = air_around(self.wind, vehicle, body, air, blown, parameters.wind)
         pushed_W = drag_acceleration(vehicle, air.velocity_W - body.v_W) + air.acceleration_W
         speeds = true_rotor_speeds(vehicle, state.rotors, fault)
         if vehicle.air != ():
-            pushed_W = pushed_W + pushed_by_air(vehicle, body, air, speeds)[0] / vehicle.mass
+            pushed_W = pushed_W + pushed_by_air(vehicle, body, air, speeds, local_W)[0] / vehicle.mass
         ground_force: Scalar = 0.0
         if self.ground is not None:
             contact = self.ground.contact(body, parameters.ground)
             pushed_W, ground_force = pushed_W + contact.force_W / vehicle.mass, contact.normal
+            if vehicle.rotor_radius != ():
+                thrust = thrust_near_ground(vehicle, thrust, body, self.ground.surface(parameters.ground))
         lift_B = Vec3(0.0, 0.0, wrench_of(vehicle, thrust).thrust / vehicle.mass)
         return Truth(
             state=body,
@@ -315,22 +333,3 @@ class Plant:
     def true_loss(self, state: PlantState, held: Held, time: Scalar, parameters: PlantParameters) -> PerRotor:
         """Lost share of each rotor's thrust by the faults of a time in s, with the rotors as they turn now."""
         return true_loss(parameters.vehicle, state.rotors, self.fault(time, held, parameters))
-
-
-def pushed_by_air(vehicle: Vehicle, state: State, air: Air, speeds: PerRotor) -> tuple[Vec3, Vec3]:
-    """Force in N, world frame, and torque in N m, body axes, of the air beyond linear drag.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        With `air`.
-    state : State
-    air : Air
-    speeds : PerRotor, rad/s
-        Of the rotors.
-    """
-    assert isinstance(vehicle.air, Aerodynamics)
-    R_WB = state.q_WB.matrix()
-    airspeed_B = R_WB.T @ (state.v_W - air.velocity_W)
-    force_B, torque_B = air_wrench(vehicle.air, vehicle.rotor_x, vehicle.rotor_y, speeds, airspeed_B, state.omega_B)
-    return R_WB @ force_B, torque_B

@@ -157,7 +157,9 @@ def test_the_hummingbird_of_rotorpy_has_the_numbers_of_ours() -> None:
 
 def test_what_the_air_does_in_rotorpy_comes_along(tmp_path: Path) -> None:
     text = CRAZYFLIE.read_text(encoding="utf-8")
-    numbers = ", ".join(f'"{key}": {k}e-6' for k, key in enumerate(("k_d", "k_z", "k_h", "k_flap", "c_Dx", "c_Dz"), 1))
+    numbers = ", ".join(
+        f'"{key}": {k}e-6' for k, key in enumerate(("k_d", "k_z", "k_h", "k_flap", "c_Dx", "c_Dz"), 1)
+    )
     path = tmp_path / "mine.py"
     path.write_text(text + f"\nquad_params = {{**quad_params, {numbers}}}\n", encoding="utf-8")
     options = {"inertia": (1.43e-5, 1.43e-5, 2.86e-5), "estimate": True, "allow_code": True}

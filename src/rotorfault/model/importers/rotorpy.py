@@ -207,7 +207,7 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
             known[key] = quantity(key, number, f"{where}: {name}{how}")
         return number
 
-    mass = take("mass", "mass")
+    take("mass", "mass")
     for axis in "xyz":
         take(f"inertia_{axis}", f"I{axis * 2}")
     thrust, torque = take("thrust_coefficient", "k_eta"), _number(found, "k_m", where)
