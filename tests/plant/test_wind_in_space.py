@@ -131,7 +131,7 @@ def rates_in(front: dict[str, Any], time: float) -> Array:
 
 
 def test_a_front_lifts_first_what_it_meets_first() -> None:
-    """Upwards, and from ahead: the nose goes up (negative pitch), then down; from behind it is the other way round."""
+    """Upwards, and from ahead: the nose goes up (negative pitch), then down; from behind the other way round."""
     front = {"velocity_W": [0.0, 0.0, 3.0], "length": 0.5, "speed": 8.0, "arrival": 0.05, "shape": "pulse"}
     ahead, behind = (rates_in(front | {"direction": angle}, 0.06) for angle in (math.pi, 0.0))
     assert ahead[1] < -0.05

@@ -75,6 +75,12 @@ def opposite_pairs(places: Sequence[tuple[float, float]], yaw_signs: Sequence[fl
     return None
 
 
+class Discs(NamedTuple):
+    """What the rotors sweep."""
+
+    radius: Scalar  # m
+
+
 class Vehicle(NamedTuple):
     """Numbers of one multirotor, SI units. Truth and belief each hold their own."""
 
@@ -94,7 +100,7 @@ class Vehicle(NamedTuple):
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
     air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
-    rotor_radius: Scalar | tuple[()] = ()  # m: near the ground thrust grows by it; empty where it does not
+    discs: Discs | tuple[()] = ()  # what rotors sweep; empty where it is not known, and they do not feel the ground
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
 
     @property
@@ -111,8 +117,8 @@ def alike(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     found = list(vehicles)
     if any(one.air != () for one in found):
         found = [one if one.air != () else one._replace(air=still_air(one.rotors)) for one in found]
-    if any(one.rotor_radius != () for one in found):
-        found = [one if one.rotor_radius != () else one._replace(rotor_radius=0.0) for one in found]
+    if any(one.discs != () for one in found):
+        found = [one if one.discs != () else one._replace(discs=Discs(0.0)) for one in found]
     return found
 
 

@@ -42,7 +42,7 @@ from rotorfault.model.quantities import (
     not_negative,
     positive,
 )
-from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle, opposite_pairs
+from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Discs, Opposite, Vehicle, opposite_pairs
 
 LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
 
@@ -252,7 +252,7 @@ class VehicleFile(Strict):
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
             air=self._aerodynamics(),
-            rotor_radius=() if self.rotor_radius is None else self.rotor_radius.value,
+            discs=() if self.rotor_radius is None else Discs(self.rotor_radius.value),
             pairs=self.pairs or (),
         )
 

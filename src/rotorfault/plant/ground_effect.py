@@ -18,7 +18,7 @@ from __future__ import annotations
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.signals import State, Wrench
-from rotorfault.model.vehicle import Vehicle, rotor_z, wrench_of
+from rotorfault.model.vehicle import Discs, Vehicle, rotor_z, wrench_of
 
 LOWEST = 0.5  # of the radius: height from which on the law holds
 SMALLEST = 1e-6  # m: so that a vehicle without rotor radius, in a batch with others that have one, feels nothing
@@ -30,14 +30,15 @@ def thrust_near_ground(vehicle: Vehicle, thrust: PerRotor, state: State, surface
     Parameters
     ----------
     vehicle : Vehicle
-        With `rotor_radius`.
+        With `discs`.
     thrust : PerRotor, N
         What they give far from it.
     state : State
     surface : scalar, m
         Height of the ground.
     """
-    R_WB, radius = state.q_WB.matrix(), vehicle.rotor_radius
+    assert isinstance(vehicle.discs, Discs)
+    R_WB, radius = state.q_WB.matrix(), vehicle.discs.radius
     up_B = Vec3(R_WB.zx, R_WB.zy, R_WB.zz)
     floor = maximum(LOWEST * radius, SMALLEST)
 

@@ -248,7 +248,7 @@ class Plant:
             residual,
             self.wind.at(time, held.wind, parameters.wind),
             () if vehicle.air == () else true_rotor_speeds(vehicle, output, fault),
-            () if self.ground is None or vehicle.rotor_radius == () else thrust,
+            () if self.ground is None or vehicle.discs == () else thrust,
             (time, held.wind) if self.wind.in_space() else (),
         )
 
@@ -313,7 +313,7 @@ class Plant:
         if self.ground is not None:
             contact = self.ground.contact(body, parameters.ground)
             pushed_W, ground_force = pushed_W + contact.force_W / vehicle.mass, contact.normal
-            if vehicle.rotor_radius != ():
+            if vehicle.discs != ():
                 thrust = thrust_near_ground(vehicle, thrust, body, self.ground.surface(parameters.ground))
         lift_B = Vec3(0.0, 0.0, wrench_of(vehicle, thrust).thrust / vehicle.mass)
         return Truth(
