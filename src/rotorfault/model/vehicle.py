@@ -21,6 +21,7 @@ from rotorfault.maths.records import Static
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics, still_air
 from rotorfault.model.signals import Wrench
+from rotorfault.model.thrust_curve import ThrustCurve
 
 FEWEST_ROTORS, MOST_ROTORS = 3, 16
 """That a vehicle may have."""
@@ -100,6 +101,7 @@ class Vehicle(NamedTuple):
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
     air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
+    curve: ThrustCurve | tuple[()] = ()  # from signal to thrust; empty where the autopilot knows it as it is
     discs: Discs | tuple[()] = ()  # what rotors sweep; empty where it is not known, and they do not feel the ground
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
 
@@ -117,6 +119,8 @@ def alike(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     found = list(vehicles)
     if any(one.air != () for one in found):
         found = [one if one.air != () else one._replace(air=still_air(one.rotors)) for one in found]
+    if any(one.curve != () for one in found):
+        found = [one if one.curve != () else one._replace(curve=ThrustCurve(0.0, 0.0)) for one in found]
     if any(one.discs != () for one in found):
         found = [one if one.discs != () else one._replace(discs=Discs(0.0)) for one in found]
     return found

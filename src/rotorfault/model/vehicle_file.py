@@ -42,6 +42,7 @@ from rotorfault.model.quantities import (
     not_negative,
     positive,
 )
+from rotorfault.model.thrust_curve import STEEPEST
 from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Discs, Opposite, Vehicle, opposite_pairs
 
 LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
@@ -72,6 +73,11 @@ class VehicleFile(Strict):
     ] = Field(
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
+    )
+    thrust_curve: (
+        Annotated[Quantity, in_unit("1", lambda value: -STEEPEST <= value <= STEEPEST, "-1 to 1")] | None
+    ) = Field(
+        default=None, description="a of T = T_max (a u^2 + (1 - a) u) for a signal u: THR_MDL_FAC, MOT_THST_EXPO"
     )
     rotor_radius: Annotated[Quantity, positive("m")] | None = Field(
         default=None, description="m, radius of the rotors: with it thrust grows near the ground"

@@ -23,6 +23,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
+from rotorfault.model.thrust_curve import ThrustCurve, followed
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
 from rotorfault.plant.air_forces import air_around, pushed_by_air
 from rotorfault.plant.faults import Fault, RotorFault, rotor_faults
@@ -173,8 +174,12 @@ class Plant:
         return state
 
     def limited(self, command: Command, parameters: PlantParameters) -> Command:
-        """The command within the rotor limits."""
-        return command._replace(thrust=limited(parameters.vehicle, command.thrust))
+        """The command within the rotor limits, as rotors follow it by their own curve from signal to thrust."""
+        vehicle = parameters.vehicle
+        thrust = limited(vehicle, command.thrust)
+        if isinstance(vehicle.curve, ThrustCurve):
+            thrust = followed(vehicle.curve, thrust, vehicle.thrust_max)
+        return command._replace(thrust=thrust)
 
     def substep(
         self,

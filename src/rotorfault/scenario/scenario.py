@@ -25,6 +25,7 @@ from rotorfault.base.foreign import is_place
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import Slot
+from rotorfault.model.thrust_curve import STEEPEST, ThrustCurve
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.plant.faults import FAULT
@@ -81,6 +82,12 @@ class Mismatch(Strict):
     rotor_bandwidth: Factor = 1.0
     rotor_gain: Factor = 1.0
     linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
+    thrust_curve: float | None = Field(
+        default=None,
+        ge=-STEEPEST,
+        le=STEEPEST,
+        description="no factor: a of the true curve from signal to thrust; as believed if not given",
+    )
 
     def applied(self, vehicle: VehicleFile) -> Vehicle:
         """The true vehicle for a believed one.
@@ -94,10 +101,19 @@ class Mismatch(Strict):
         factors = {name: getattr(self, name) for name in ("mass", "rotor_bandwidth", "rotor_gain", "linear_drag")}
         factors |= {"inertia_x": x, "inertia_y": y, "inertia_z": z}
         try:
-            return vehicle.with_factors(factors).vehicle
+            true = vehicle.with_factors(factors).vehicle
         except PydanticCustomError as error:
             about = error.context or {}
             raise refusal("mismatch", f"the true vehicle: {about.get('key')}: {error.message()}") from None
+        if self.thrust_curve is None:
+            return true
+        if vehicle.thrust_curve is None:
+            raise refusal(
+                "mismatch.thrust_curve",
+                f"got {self.thrust_curve:g}, but vehicle '{vehicle.name}' has no thrust_curve, the one that the "
+                "autopilot believes; give it in the vehicle file, such as THR_MDL_FAC or MOT_THST_EXPO has it",
+            )
+        return true._replace(curve=ThrustCurve(vehicle.thrust_curve.value, self.thrust_curve))
 
 
 def _vehicle(value: Any) -> VehicleFile:

@@ -140,7 +140,8 @@ def scenario_settings() -> Iterator[Setting]:
     for name, field in scenario_fields().items():
         if name in inside:
             for setting in settings(inside[name], f"{name}."):
-                factor = f"factor on the true {setting.meaning}" if name == "mismatch" else setting.meaning
+                plain = name != "mismatch" or setting.meaning.startswith("no factor: ")
+                factor = setting.meaning if plain else f"factor on the true {setting.meaning}"
                 yield setting._replace(meaning=factor)
         elif name in SLOTS:
             yield _slot_setting(SLOTS[name], field)

@@ -192,7 +192,8 @@ def _vehicle(file: VehicleFile, mismatch: Mismatch) -> str:
     other = {
         name: value
         for name, value in mismatch.model_dump(mode="json").items()
-        if np.any(np.asarray(value, dtype=float) != 1.0)
+        # Of what is no factor, 1 is a number like any other.
+        if value is not None and (name == "thrust_curve" or np.any(np.asarray(value, dtype=float) != 1.0))
     }
     return f"{text}; the true one differs from it by factors: {_settings(other)}" if other else text
 

@@ -15,7 +15,7 @@ from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.model.frames import Frame, place_of
 from rotorfault.model.importers.estimates import Known, estimate_of
-from rotorfault.model.importers.numbers import GRAVITY, UNITS, Given, checked, quantity
+from rotorfault.model.importers.numbers import GRAVITY, OPTIONAL_UNITS, UNITS, Given, checked, quantity
 from rotorfault.model.quantities import Quantity
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.model.vehicle_text import vehicle_text
@@ -123,7 +123,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
         name,
         f"imported from {draft.about}",
         [f"Made by rotorfault from {draft.about}.", *draft.notes],
-        [(key, numbers[key]) for key in UNITS],
+        [(key, numbers[key]) for key in (*UNITS, *OPTIONAL_UNITS) if key in numbers],
         [
             (rotor.label, rotor.x, rotor.y, rotor.z, "+" if rotor.clockwise else "-", rotor.source)
             for rotor in rotors

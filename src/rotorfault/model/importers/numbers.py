@@ -30,6 +30,9 @@ UNITS = {
 }
 """Numbers of a vehicle in the order of its file, with their units."""
 
+OPTIONAL_UNITS = {"thrust_curve": "1", "rotor_radius": "m"}
+"""Numbers that a vehicle may do without; nobody is asked for them."""
+
 GRAVITY = 9.81
 
 
@@ -66,7 +69,7 @@ def quantity(key: str, value: float, source: str) -> Quantity:
     """
     if not math.isfinite(value):
         raise InputError(f"{source}: {key} is {value}; allowed: a finite number")
-    return Quantity(value=value, unit=UNITS[key], source=source)
+    return Quantity(value=value, unit={**UNITS, **OPTIONAL_UNITS}[key], source=source)
 
 
 def same(values: Iterable[float], what: str, where: str, hint: str) -> float:

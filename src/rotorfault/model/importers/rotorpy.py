@@ -220,6 +220,7 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
         speed = _number(found, name, where)
         if speed is not None and thrust:
             take(key, name, " squared, times k_eta", thrust * speed * speed)
+    take("rotor_radius", "rotor_radius")
     if air:
         take("linear_drag", "k_d", ": none beside the drag in [air]", 0.0)
     left = sorted({LEFT_OUT[name] for name in LEFT_OUT if _number(found, name, where)})
