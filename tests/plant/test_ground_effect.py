@@ -22,7 +22,7 @@ from rotorfault.model.vehicle import Discs, Vehicle, alike
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant import GROUND
 from rotorfault.plant.ground_effect import thrust_near_ground
-from rotorfault.scenario.scenario import Scenario
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 R = 0.1  # m
 VEHICLE = load_vehicle("hummingbird").vehicle._replace(discs=Discs(R))
@@ -134,7 +134,7 @@ def test_without_radius_or_ground_it_is_not_there() -> None:
     for one in tables:
         one.pop("ground")
         one["on_fault"] = {"kind": away["on_fault"]}
-    one, other = (rf.scenario.scenario.scenario_from(table, "test") for table in tables)
+    one, other = (scenario_from(table, "test") for table in tables)
     assert operations(one) == operations(other)
 
 

@@ -249,6 +249,8 @@ def closed_loop(scenario: Scenario, own_motors: bool = False) -> tuple[Apart, Re
         If RotorPy is not installed, or the scenario has ground or another model of the body.
     """
     batch = assemble(scenario)
+    if batch.loop.battery:
+        raise InputError("start.charge: RotorPy has no battery; leave it out")
     plant = RotorPyPlant(batch.loop.plant, batch.parameters.vehicle.rotor_bandwidth, own_motors)
     theirs = python.run(batch._replace(loop=batch.loop.with_plant(cast(Plant, plant))))
     ours, layout = python.run(batch), batch.loop.layout

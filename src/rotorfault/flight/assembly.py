@@ -156,7 +156,14 @@ def stacked(template: R, records: Sequence[R]) -> R:
 def build(scenario: Scenario, own: Own | None = None) -> ClosedLoop:
     """The parts of a scenario put together; see `assemble`."""
     telemetry = source_of(scenario, own or {}).Telemetry
-    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, telemetry, len(scenario.vehicle.rotor))
+    return ClosedLoop(
+        parts_of(scenario, own or {}),
+        scenario.substeps,
+        telemetry,
+        len(scenario.vehicle.rotor),
+        battery=scenario.start.charge is not None,
+        compensates=scenario.voltage_compensation,
+    )
 
 
 def parts_of(scenario: Scenario, own: Own) -> dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]:

@@ -55,6 +55,26 @@ class Rotor(Strict):
     name: str = Field(default="", description="the vendor's name of the rotor")
 
 
+class BatteryFile(Strict):
+    """A pack, and what its power goes into. See `rotorfault.model.battery`."""
+
+    cells: Annotated[Quantity, in_unit("1", lambda n: n >= 1.0 and n == int(n), "a whole number from 1 on")] = Field(
+        description="1, cells in series"
+    )
+    capacity: Annotated[Quantity, positive("A s")] = Field(
+        description="A s, charge of a full pack: 3.6 times the mAh"
+    )
+    resistance: Annotated[Quantity, positive("ohm")] = Field(description="ohm, series resistance of the pack")
+    pair_resistance: Annotated[Quantity, positive("ohm")] = Field(
+        description="ohm, resistance of its resistor-capacitor pair"
+    )
+    pair_capacitance: Annotated[Quantity, positive("F")] = Field(description="F, capacitance of the pair")
+    efficiency: Annotated[Quantity, in_unit("1", lambda value: 0.0 < value <= 1.0, "more than 0, up to 1")] = Field(
+        description="1, power of an ideal rotor in hover over the power that it takes from the pack"
+    )
+    other_power: Annotated[Quantity, not_negative("W")] = Field(description="W, power of all that is no rotor")
+
+
 class AirFile(Strict):
     """What the air does beyond linear drag; all 0 if not given. See `rotorfault.model.aerodynamics`."""
 

@@ -20,6 +20,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import Static
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics, still_air
+from rotorfault.model.battery import Battery, no_battery
 from rotorfault.model.signals import Wrench
 from rotorfault.model.thrust_curve import ThrustCurve
 
@@ -103,6 +104,7 @@ class Vehicle(NamedTuple):
     air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
     curve: ThrustCurve | tuple[()] = ()  # from signal to thrust; empty where the autopilot knows it as it is
     discs: Discs | tuple[()] = ()  # what rotors sweep; empty where it is not known, and they do not feel the ground
+    battery: Battery | tuple[()] = ()  # the pack; empty for a vehicle of which it is not known
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
 
     @property
@@ -121,6 +123,8 @@ def alike(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
         found = [one if one.air != () else one._replace(air=still_air(one.rotors)) for one in found]
     if any(one.curve != () for one in found):
         found = [one if one.curve != () else one._replace(curve=ThrustCurve(0.0, 0.0)) for one in found]
+    if any(one.battery != () for one in found):
+        found = [one if one.battery != () else one._replace(battery=no_battery()) for one in found]
     if any(one.discs != () for one in found):
         found = [one if one.discs != () else one._replace(discs=Discs(0.0)) for one in found]
     return found

@@ -32,8 +32,10 @@ from rotorfault.base.one_line import cut
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.battery import Battery, rotor_power
 from rotorfault.model.quantities import (
     AirFile,
+    BatteryFile,
     Inertia,
     Quantity,
     Rotor,
@@ -77,11 +79,12 @@ class VehicleFile(Strict):
     thrust_curve: (
         Annotated[Quantity, in_unit("1", lambda value: -STEEPEST <= value <= STEEPEST, "-1 to 1")] | None
     ) = Field(
-        default=None, description="a of T = T_max (a u^2 + (1 - a) u) for a signal u: THR_MDL_FAC, MOT_THST_EXPO"
+        default=None, description="1, a of T = T_max (a u^2 + (1 - a) u) for a signal u: THR_MDL_FAC, MOT_THST_EXPO"
     )
     rotor_radius: Annotated[Quantity, positive("m")] | None = Field(
         default=None, description="m, radius of the rotors: with it thrust grows near the ground"
     )
+    battery: BatteryFile | None = Field(default=None, description="the pack; flown with start.charge")
     air: AirFile | None = Field(default=None, description="what the air does beyond linear drag")
     rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
@@ -89,6 +92,7 @@ class VehicleFile(Strict):
     def _consistent(self) -> VehicleFile:
         for check in (
             self._check_inertia,
+            self._check_battery,
             self._check_count,
             self._check_thrust,
             self._check_rank,
@@ -149,6 +153,11 @@ class VehicleFile(Strict):
                 message = f"got {moment!r} kg m^2; allowed: at most the sum of the other two, {others:.6g} (no rigid"
                 return refusal(f"inertia_{axis}", f"{message} body has more); check the exponents")
         return None
+
+    def _check_battery(self) -> PydanticCustomError | None:
+        if self.battery is None or self.rotor_radius is not None:
+            return None
+        return refusal("rotor_radius", "is not given; a vehicle with [battery] needs it for the power of its rotors")
 
     def _check_count(self) -> PydanticCustomError | None:
         count = len(self.rotor)
@@ -258,8 +267,25 @@ class VehicleFile(Strict):
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
             air=self._aerodynamics(),
+            battery=self._battery(),
             discs=() if self.rotor_radius is None else Discs(self.rotor_radius.value),
             pairs=self.pairs or (),
+        )
+
+    def _battery(self) -> Battery | tuple[()]:
+        """Numbers of the pack; empty if there is none."""
+        if self.battery is None or self.rotor_radius is None:
+            return ()
+        pack, curve = self.battery, self.thrust_curve
+        return Battery(
+            cells=pack.cells.value,
+            capacity=pack.capacity.value,
+            resistance=pack.resistance.value,
+            pair_resistance=pack.pair_resistance.value,
+            pair_capacitance=pack.pair_capacitance.value,
+            rotor_power=rotor_power(self.rotor_radius.value, pack.efficiency.value),
+            other_power=pack.other_power.value,
+            curve=1.0 if curve is None else curve.value,
         )
 
     def _aerodynamics(self) -> Aerodynamics | tuple[()]:
@@ -288,6 +314,8 @@ class VehicleFile(Strict):
             yield f"rotor.{number}.y", rotor.y
             if rotor.z is not None:
                 yield f"rotor.{number}.z", rotor.z
+        for key in () if self.battery is None else BatteryFile.model_fields:
+            yield f"battery.{key}", getattr(self.battery, key)
         for key in () if self.air is None else AirFile.model_fields:
             if (coefficient := getattr(self.air, key)) is not None:
                 yield f"air.{key}", coefficient

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, final
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.battery import Battery, Charge, Supply, at_voltage, discharged, supply
 from rotorfault.model.motion import drag_acceleration, limited
 from rotorfault.model.signals import Command, State, Wrench
 from rotorfault.model.thrust_curve import ThrustCurve, followed
@@ -31,7 +32,7 @@ from rotorfault.plant.ground import Ground
 from rotorfault.plant.ground_effect import thrust_near_ground, with_ground_effect
 from rotorfault.plant.integrator import rk4
 from rotorfault.plant.models import BodyModel
-from rotorfault.plant.rotors import delivered_thrust, lag_step, true_loss, true_rotor_speeds
+from rotorfault.plant.rotors import delivered_thrust, lag_step, true_loss, true_rotor_speeds, turning_thrust
 from rotorfault.plant.wind import Air, Wind
 
 
@@ -56,6 +57,7 @@ class PlantState(NamedTuple):
 
     body: Any  # record of the body model
     rotors: PerRotor  # N, lag outputs v of (8)
+    battery: Charge | tuple[()] = ()  # empty where the voltage is constant
 
 
 class Truth(NamedTuple):
@@ -68,6 +70,8 @@ class Truth(NamedTuple):
     loss: PerRotor  # 0 sound .. 1 dead
     air: Air
     ground_force: Scalar  # N, upwards
+    supply: Supply | tuple[()] = ()  # empty where the voltage is constant
+    charge: Scalar = 1.0  # of the battery
 
 
 class Forcing(NamedTuple):
@@ -122,6 +126,7 @@ class Plant:
         omega_B: Vec3,
         rotor_thrust: PerRotor,
         parameters: PlantParameters,
+        battery: Charge | tuple[()] = (),
     ) -> PlantState:
         """State at the start of a flight.
 
@@ -137,9 +142,11 @@ class Plant:
             Thrusts k v that the rotors give if they are sound.
         parameters : PlantParameters
             Numbers of the truth.
+        battery : Charge
+            Empty where the voltage is constant.
         """
         body = self.model.start(p_W, v_W, attitude, omega_B)
-        return PlantState(body, rotor_thrust / parameters.vehicle.rotor_gain)
+        return PlantState(body, rotor_thrust / parameters.vehicle.rotor_gain, battery)
 
     def step(
         self,
@@ -192,7 +199,8 @@ class Plant:
     ) -> PlantState:
         """State one integration step of length dt [s] later, the command (within the rotor limits) held."""
         fault = rotor_faults(self.faults, held.faults, parameters.faults, time, dt, parameters.vehicle.rotors)
-        lag = lag_step(parameters.vehicle, state.rotors, command.thrust, dt)
+        asked, battery = self.supplied(state, command.thrust, fault, parameters, dt)
+        lag = lag_step(parameters.vehicle, state.rotors, asked, dt)
         start, half, end = (self.residual_speed(output, fault, parameters) for output in lag.outputs)
         times, speeds = (time, time + 0.5 * dt, time + dt), (start - (start - end) * lag.sag, half, end)
         first, middle, last = (
@@ -204,7 +212,22 @@ class Plant:
             return self.derivative(stopped, forcing, command, parameters)
 
         stopped = rk4(derivative, self.stopped(state.body, start, parameters), (first, middle, last), dt)
-        return PlantState(self.model.after_step(self.turning(stopped, end, parameters)), lag.outputs[-1])
+        return PlantState(self.model.after_step(self.turning(stopped, end, parameters)), lag.outputs[-1], battery)
+
+    def supplied(
+        self, state: PlantState, thrust: PerRotor, fault: RotorFault, parameters: PlantParameters, dt: Scalar
+    ) -> tuple[PerRotor, Charge | tuple[()]]:
+        """Thrusts in N that rotors settle at, at the voltage that there is, and the battery a step of dt [s] later.
+
+        Power and voltage are held over the step: seconds go by before they have changed.
+        """
+        vehicle, charge = parameters.vehicle, state.battery
+        if not isinstance(charge, Charge):
+            return thrust, charge
+        assert isinstance(vehicle.battery, Battery)
+        given = supply(vehicle.battery, charge, turning_thrust(vehicle, state.rotors, fault))
+        after = discharged(vehicle.battery, charge, given.current, dt)
+        return at_voltage(vehicle.battery, thrust, vehicle.thrust_max, given.share), after
 
     def residual_speed(self, output: PerRotor, fault: RotorFault, parameters: PlantParameters) -> Scalar:
         """Omega of (4) in rad/s for lag outputs in N."""
@@ -329,7 +352,18 @@ class Plant:
             loss=true_loss(vehicle, state.rotors, fault),
             air=air,
             ground_force=ground_force,
+            **self.supply(state, fault, vehicle),
         )
+
+    @staticmethod
+    def supply(state: PlantState, fault: RotorFault, vehicle: Vehicle) -> dict[str, Any]:
+        """What the truth says of the battery."""
+        charge = state.battery
+        if not isinstance(charge, Charge):
+            return {}
+        assert isinstance(vehicle.battery, Battery)
+        given = supply(vehicle.battery, charge, turning_thrust(vehicle, state.rotors, fault))
+        return {"supply": given, "charge": charge.charge}
 
     def fault(self, time: Scalar, held: Held, parameters: PlantParameters) -> RotorFault:
         """State of the rotors at a time in s."""

@@ -61,6 +61,7 @@ def neighbour(
     x, y, z = _existing(scenario.vehicle.vehicle.inertia, inertia)
     mismatch = Mismatch(mass=mass, inertia=(x, y, z), linear_drag=drag)
     start = Start(
+        charge=scenario.start.charge,
         position=scaled(scenario.start.position),
         velocity=scaled(scenario.start.velocity),
         attitude=scaled(scenario.start.attitude),

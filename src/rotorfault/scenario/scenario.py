@@ -23,6 +23,7 @@ from rotorfault.base.config import Strict, Three, passed_on, refusal, validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
 from rotorfault.base.one_line import LONGEST, cut
+from rotorfault.model.battery import Battery
 from rotorfault.model.block import TimeGrid
 from rotorfault.model.slot import Slot
 from rotorfault.model.thrust_curve import STEEPEST, ThrustCurve
@@ -56,6 +57,9 @@ class Start(Strict):
     velocity: Three = Field(default=(0.0, 0.0, 0.0), description="[m/s], world frame")
     attitude: tuple[Lean, Lean, Heading] = Field(default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]")
     body_rates: tuple[Rate, Rate, Rate] = Field(default=(0.0, 0.0, 0.0), description="[rad/s], body frame")
+    charge: float | None = Field(
+        default=None, gt=0.0, le=1.0, description="of the battery, 1 full; the voltage is constant if not given"
+    )
 
     @model_validator(mode="after")
     def _upright(self) -> Start:
@@ -113,6 +117,8 @@ class Mismatch(Strict):
                 f"got {self.thrust_curve:g}, but vehicle '{vehicle.name}' has no thrust_curve, the one that the "
                 "autopilot believes; give it in the vehicle file, such as THR_MDL_FAC or MOT_THST_EXPO has it",
             )
+        if isinstance(true.battery, Battery):
+            true = true._replace(battery=true.battery._replace(curve=self.thrust_curve))
         return true._replace(curve=ThrustCurve(vehicle.thrust_curve.value, self.thrust_curve))
 
 
@@ -146,6 +152,9 @@ class Scenario(Strict):
         default=None, gt=0.0, description="time between two records [s]; the sampling period if not given"
     )
     seed: int = Field(default=0, ge=0, le=MOST_SEED, description="names the random numbers of sensor noise and gusts")
+    voltage_compensation: bool = Field(
+        default=False, description="whether the autopilot sends more signal as the voltage of the battery falls"
+    )
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
 
@@ -213,6 +222,7 @@ class Scenario(Strict):
                 f"{self.steps / self.every:.3g} records take more memory than there is; allowed: up to "
                 f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
             )
+        self._require_battery()
         require_flyable(self.mismatch.applied(self.vehicle), self.grid)
         count = len(self.vehicle.rotor)
         for number, fault in enumerate(self.all(FAULT)):
@@ -229,6 +239,15 @@ class Scenario(Strict):
             elif (one := self.maybe(slot)) is not None:
                 require_on_grid(one, slot.name, self.grid)
         return self
+
+    def _require_battery(self) -> None:
+        name = cut(self.vehicle.name)
+        if self.start.charge is not None and self.vehicle.battery is None:
+            raise refusal("start.charge", f"got {self.start.charge:g}, but vehicle '{name}' has no [battery]")
+        if self.voltage_compensation and self.start.charge is None:
+            raise refusal(
+                "voltage_compensation", "got true, but the voltage is constant; give start.charge, such as 1.0"
+            )
 
     @property
     def grid(self) -> TimeGrid:
