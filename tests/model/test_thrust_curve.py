@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 import rotorfault as rf
 from rotorfault.base.errors import InputError
-from rotorfault.engine.program import program, same_for_all, trace
+from rotorfault.engine.program import program, same_code, same_for_all, trace
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.records import flatten
 from rotorfault.model.thrust_curve import ThrustCurve, followed, share_of, signal_of
-from rotorfault.scenario.scenario import Scenario
+from rotorfault.scenario.scenario import Scenario, scenario_from
 
 curve, share = st.floats(-1.0, 1.0), st.floats(0.0, 1.0)
 
@@ -76,6 +77,17 @@ def test_one_that_is_taken_for_linear_gives_too_little_below_the_middle() -> Non
     vehicle = rf.load_vehicle("hummingbird").vehicle
     got = followed(ThrustCurve(0.0, 1.0), PerRotor.all(vehicle.thrust_max / 3.0), vehicle.thrust_max).r1
     assert got == pytest.approx(vehicle.thrust_max / 9.0)
+
+
+def test_loops_of_as_many_numbers_are_told_apart() -> None:
+    """A curve in truth has two numbers, discs in truth and belief too; compiled code of one is none of the other."""
+    curve = assemble(with_curve(0.5, **{"mismatch.thrust_curve": 0.5}))
+    tables = with_curve(None).as_tables()
+    tables["vehicle"]["rotor_radius"] = {"value": 0.1, "unit": "m", "source": "test"}
+    discs = assemble(scenario_from(tables, "test"))
+    assert len(flatten(curve.parameters)) == len(flatten(discs.parameters))
+    assert same_for_all(curve) != same_for_all(discs)
+    assert not same_code(curve, discs)
 
 
 @every_engine

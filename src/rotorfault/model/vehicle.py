@@ -130,6 +130,16 @@ def alike(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     return found
 
 
+def has(vehicle: Vehicle) -> tuple[bool, ...]:
+    """Which of the records that not every vehicle has are there: they decide what is computed."""
+    return tuple(record != () for record in (vehicle.air, vehicle.curve, vehicle.discs, vehicle.battery))
+
+
+def bare(vehicle: Vehicle) -> Vehicle:
+    """The same vehicle without what is there in some flights only: what the air does, discs, curve and battery."""
+    return vehicle._replace(air=(), curve=(), discs=(), battery=())
+
+
 def rotor_z(vehicle: Vehicle) -> PerRotor:
     """Heights in m of the rotors above the centre of mass; 0 where they are not given."""
     return vehicle.air.rotor_z if isinstance(vehicle.air, Aerodynamics) else PerRotor.all(0.0, vehicle.rotors)

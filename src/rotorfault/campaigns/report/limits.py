@@ -28,7 +28,7 @@ from rotorfault.flight.sweep import checked_columns, groups_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import unflatten
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, bare
 from rotorfault.scenario.scenario import Scenario
 
 MOST_ENDS = 256  # combinations of ends of draws; beyond, there is no answer
@@ -140,6 +140,7 @@ def _physics_of(group: Group) -> Physics | None:
         lasting = np.where(fault.onset(record) < group.scenario.duration, 1.0 - loss, 1.0)
         remaining[fault.rotor - 1] = remaining[fault.rotor - 1] * lasting
     wind_W = loop.plant.wind.mean_velocity(numbers.parts.wind)
-    if wind_W is None:
+    # What a battery leaves of the greatest thrust depends on the flight.
+    if wind_W is None or loop.battery:
         return None
-    return Physics(numbers.vehicle, PerRotor.of(1.0 - share for share in remaining), wind_W)
+    return Physics(bare(numbers.vehicle), PerRotor.of(1.0 - share for share in remaining), wind_W)
