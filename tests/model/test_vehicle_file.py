@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.quantities import BatteryFile
+from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
 BUILT_IN = (
