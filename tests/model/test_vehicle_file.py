@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.quantities import BatteryFile
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
@@ -33,8 +34,11 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     assert file.name == name
     assert file.description
     assert 1.5 < file.thrust_to_weight < 5.0
+    numbers = dict(file.quantities())
     axes = sum(rotor.axis is not None for rotor in file.rotor)
-    assert len(dict(file.quantities())) == 14 + 2 * len(file.rotor) + axes
+    some_have = {"rotor_radius", *(f"battery.{key}" for key in BatteryFile.model_fields)}
+    assert len(numbers.keys() - some_have) == 14 + 2 * len(file.rotor) + axes
+    assert not numbers.keys() & some_have or some_have <= numbers.keys()
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
 
 

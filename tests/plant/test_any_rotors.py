@@ -18,7 +18,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.motion import lag_bandwidth
 from rotorfault.model.signals import Command
 from rotorfault.model.tilt import Tilt
-from rotorfault.model.vehicle import Reversible, Vehicle, lateral_force, wrench_of
+from rotorfault.model.vehicle import Reversible, Vehicle, lateral_force, rotor_heights, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.plant.rotors import lag_step
 
@@ -49,7 +49,8 @@ def odd_vehicle(seed: int = 3) -> Vehicle:
         rotor_gain=each(1.0, 0.1),
         rotor_inertia=2e-4,
         inertia_products=Vec3(0.006, -0.004, 0.003),
-        tilt=Tilt(x, y, z, heights),
+        rotor_z=heights,
+        tilt=Tilt(x, y, z),
         reversible=Reversible(),
     )
 
@@ -68,7 +69,7 @@ class Independent:
         self.J = matrix(v.inertia, v.inertia_products)
         assert isinstance(v.tilt, Tilt)
         self.axes = np.array([[*v.tilt.x], [*v.tilt.y], [*v.tilt.z]]).T
-        self.places = np.array([[*v.rotor_x], [*v.rotor_y], [*v.tilt.height]]).T
+        self.places = np.array([[*v.rotor_x], [*v.rotor_y], [*rotor_heights(v)]]).T
         self.sign, self.v = np.array([*v.rotor_yaw_sign]), v
         self.b, self.ratio, self.gain, self.up, self.down = (
             np.array([*x])
@@ -178,9 +179,7 @@ def test_rotors_that_speed_up_leave_momentum_as_it_is_along_their_own_axes() -> 
     none = PerRotor.all(0.0, COUNT)
     vehicle = odd_vehicle()
     assert isinstance(vehicle.tilt, Tilt)
-    vehicle = vehicle._replace(
-        rotor_x=none, rotor_y=none, torque_ratio=0.0, tilt=vehicle.tilt._replace(height=none), rotor_inertia=1e-3
-    )
+    vehicle = vehicle._replace(rotor_x=none, rotor_y=none, torque_ratio=0.0, rotor_z=none, rotor_inertia=1e-3)
     independent = Independent(vehicle._replace(torque_ratio=none))
     plant = plant_of(substeps=8)
     parameters = numbers_of(plant, vehicle, PERIOD)
@@ -237,7 +236,8 @@ def test_the_wrench_of_a_tilted_rotor_by_hand() -> None:
         rotor_y=none,
         rotor_yaw_sign=PerRotor(1.0, 1.0, -1.0, -1.0),
         torque_ratio=0.01,
-        tilt=Tilt(none, PerRotor(half, 0.0, 0.0, 0.0), PerRotor(cosine, 1.0, 1.0, 1.0), PerRotor(0.1, 0.0, 0.0, 0.0)),
+        rotor_z=PerRotor(0.1, 0.0, 0.0, 0.0),
+        tilt=Tilt(none, PerRotor(half, 0.0, 0.0, 0.0), PerRotor(cosine, 1.0, 1.0, 1.0)),
         pairs=(),
     )
     wrench = wrench_of(vehicle, PerRotor(2.0, 0.0, 0.0, 0.0))

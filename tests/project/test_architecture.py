@@ -61,6 +61,10 @@ LAZY = {
         "rotorfault.campaigns.axes": "is needed for studies and what they vary alone",
         "rotorfault.campaigns.study": "the same, and its statistics take long to load",
     },
+    "rotorfault.bench.rotorpy_plant": {
+        "rotorpy.vehicles.hummingbird_params": OPTIONAL,
+        "rotorpy.vehicles.multirotor": OPTIONAL,
+    },
     "rotorfault.engine": {
         "rotorfault.engine.arrays": "one engine flies, the others need not load",
         "rotorfault.engine.python": "the same",

@@ -181,7 +181,7 @@ def test_signals_are_those_of_flights() -> None:
     rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
     seen = set()
     for kind in CONTROLLER.registry:
-        settings = {"duration": 0.002, "controller.kind": kind}
+        settings = {"duration": 0.002, "controller.kind": kind, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
         data = rf.fly("land-after-fault", settings=settings, engine="python").data
         for name, variable in data.data_vars.items():
             _, _, dims, unit, _, recorded, meaning, _ = rows[str(name)]

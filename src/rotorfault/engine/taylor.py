@@ -57,6 +57,8 @@ def fly_taylor(batch: Batch, watch: Watch = no_watch, tolerance: float = TOLERAN
     plant = batch.loop.plant
     if plant.ground is not None:
         raise InputError("ground: contact is not smooth, so Taylor series cannot serve; allowed: a flight without it")
+    if batch.loop.battery:
+        raise InputError("start.charge: power is held over integration steps, of which Taylor series have none")
     # A wrapped plant, not a second loop: whatever else happens in a sampling period stays as it is.
     wrapped = cast(Plant, _TaylorPlant(plant, batch, tolerance))
     return python.run(batch._replace(loop=batch.loop.with_plant(wrapped)), watch)

@@ -157,8 +157,15 @@ def build(scenario: Scenario, own: Own | None = None) -> ClosedLoop:
     """The parts of a scenario put together; see `assemble`."""
     telemetry = source_of(scenario, own or {}).Telemetry
     rotors = scenario.vehicle.rotor
-    tilted = any(rotor.axis is not None for rotor in rotors)
-    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, telemetry, len(rotors), tilted)
+    return ClosedLoop(
+        parts_of(scenario, own or {}),
+        scenario.substeps,
+        telemetry,
+        len(rotors),
+        tilted=any(rotor.axis is not None for rotor in rotors),
+        battery=scenario.start.charge is not None,
+        compensates=scenario.voltage_compensation,
+    )
 
 
 def parts_of(scenario: Scenario, own: Own) -> dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]:

@@ -28,8 +28,8 @@ from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, maximum, sqrt
 from rotorfault.model.signals import Wrench
-from rotorfault.model.tilt import Tilt, tilted_rows
-from rotorfault.model.vehicle import Vehicle, drag_arms
+from rotorfault.model.tilt import Tilt
+from rotorfault.model.vehicle import Vehicle, drag_arms, rows_of_tilted
 
 # Of a row of length 1, squared: what is left of it beside the others. A frame that the vehicle file allows has 1e-6.
 LEAST_PIVOT = 1e-9
@@ -64,7 +64,7 @@ class WrenchRows(NamedTuple):
 def effectiveness(vehicle: Vehicle) -> WrenchRows:
     """B: thrust [N], and torque [N m] about the body axes, of a newton of each rotor."""
     if isinstance(vehicle.tilt, Tilt):
-        rows = tilted_rows(vehicle.tilt, vehicle.rotor_x, vehicle.rotor_y, drag_arms(vehicle))
+        rows = rows_of_tilted(vehicle)
         return WrenchRows(rows.force_z, rows.roll, rows.pitch, rows.yaw)
     return WrenchRows(
         PerRotor.all(1.0, vehicle.rotors),

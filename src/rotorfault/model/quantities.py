@@ -12,6 +12,8 @@ from pydantic import AfterValidator, Field, PlainSerializer, PlainValidator
 from rotorfault.base.config import Strict, Three, refusal
 from rotorfault.base.number_rule import real, short
 from rotorfault.maths.geometry import Vec3
+from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.battery import Battery, rotor_power
 
 
 class Quantity(Strict):
@@ -141,6 +143,39 @@ class Rotor(Strict):
     name: str = Field(default="", description="the vendor's name of the rotor")
 
 
+class BatteryFile(Strict):
+    """A pack, and what its power goes into. See `rotorfault.model.battery`."""
+
+    cells: Annotated[Quantity, in_unit("1", lambda n: n >= 1.0 and n == int(n), "a whole number from 1 on")] = Field(
+        description="1, cells in series"
+    )
+    capacity: Annotated[Quantity, positive("A s")] = Field(
+        description="A s, charge of a full pack: 3.6 times the mAh"
+    )
+    resistance: Annotated[Quantity, positive("ohm")] = Field(description="ohm, series resistance of the pack")
+    pair_resistance: Annotated[Quantity, positive("ohm")] = Field(
+        description="ohm, resistance of its resistor-capacitor pair"
+    )
+    pair_capacitance: Annotated[Quantity, positive("F")] = Field(description="F, capacitance of the pair")
+    efficiency: Annotated[Quantity, in_unit("1", lambda value: 0.0 < value <= 1.0, "more than 0, up to 1")] = Field(
+        description="1, power of an ideal rotor in hover over the power that it takes from the pack"
+    )
+    other_power: Annotated[Quantity, not_negative("W")] = Field(description="W, power of all that is no rotor")
+
+    def pack(self, radius: float, curve: float) -> Battery:
+        """The numbers alone, of a vehicle with rotors of a radius in m and a curve from signal to thrust."""
+        return Battery(
+            cells=self.cells.value,
+            capacity=self.capacity.value,
+            resistance=self.resistance.value,
+            pair_resistance=self.pair_resistance.value,
+            pair_capacitance=self.pair_capacitance.value,
+            rotor_power=rotor_power(radius, self.efficiency.value),
+            other_power=self.other_power.value,
+            curve=curve,
+        )
+
+
 class AirFile(Strict):
     """What the air does beyond linear drag; all 0 if not given. See `rotorfault.model.aerodynamics`."""
 
@@ -183,6 +218,22 @@ class AirFile(Strict):
     damping_squared_yaw: Annotated[Quantity, not_negative("N m s^2")] | None = Field(
         default=None, description="the same for yaw"
     )
+
+    @property
+    def aerodynamics(self) -> Aerodynamics | tuple[()]:
+        """The coefficients alone; empty where all are 0, which costs nothing then."""
+        if not any(self.number(key) for key in type(self).model_fields):
+            return ()
+        angles, axes = ("roll", "pitch", "yaw"), ("x", "y", "z")
+        return Aerodynamics(
+            rotor_drag=self.number("rotor_drag"),
+            inflow=self.number("inflow"),
+            translational_lift=self.number("translational_lift"),
+            flapping=self.number("flapping"),
+            frame_drag=self.along("frame_drag", axes),
+            damping=self.along("damping", angles),
+            damping_squared=self.along("damping_squared", angles),
+        )
 
     def number(self, key: str) -> float:
         """A coefficient, 0 where it is not given."""

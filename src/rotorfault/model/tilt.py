@@ -23,12 +23,11 @@ from rotorfault.maths.scalar import Scalar
 
 
 class Tilt(NamedTuple):
-    """Axes of the rotors, unit vectors in body axes, and how high the rotors sit."""
+    """Axes of the rotors, unit vectors in body axes."""
 
     x: PerRotor  # 1, forward
     y: PerRotor  # 1, left
     z: PerRotor  # 1, up
-    height: PerRotor  # m, of the rotors above the centre of mass
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -50,28 +49,30 @@ class TiltedRows(NamedTuple):
 
 
 def upright(rotors: int) -> Tilt:
-    """Of so many rotors that point up, with the heights that make no difference then."""
+    """Of so many rotors that point up."""
     none = PerRotor.all(0.0, rotors)
-    return Tilt(none, none, PerRotor.all(1.0, rotors), none)
+    return Tilt(none, none, PerRotor.all(1.0, rotors))
 
 
-def tilted_rows(tilt: Tilt, rotor_x: PerRotor, rotor_y: PerRotor, drag: PerRotor | Scalar) -> TiltedRows:
+def tilted_rows(
+    tilt: Tilt, rotor_x: PerRotor, rotor_y: PerRotor, rotor_z: PerRotor, drag: PerRotor | Scalar
+) -> TiltedRows:
     """Force and torque of a newton of each rotor.
 
     Parameters
     ----------
     tilt : Tilt
-    rotor_x, rotor_y : PerRotor, m
-        Where the rotors are, forward and left of the centre of mass.
+    rotor_x, rotor_y, rotor_z : PerRotor, m
+        Where the rotors are, forward, left and up of the centre of mass.
     drag : PerRotor, m
         Drag torque over thrust with its sign: positive if it turns a body under an upright rotor to the left.
     """
-    ax, ay, az, height = tilt
+    ax, ay, az = tilt
     return TiltedRows(
         ax,
         ay,
         az,
-        rotor_y * az - height * ay + ax * drag,
-        height * ax - rotor_x * az + ay * drag,
+        rotor_y * az - rotor_z * ay + ax * drag,
+        rotor_z * ax - rotor_x * az + ay * drag,
         rotor_x * ay - rotor_y * ax + az * drag,
     )

@@ -10,8 +10,8 @@ geometry (rotor 1 front, 2 rear, 3 right, 4 left) this is its equation (4) with 
     tau_yaw   = kappa (F1 + F2 - F3 - F4)
 
 Where rotors differ, a number of theirs is a `PerRotor` in place of one scalar. What a vehicle may have and most have
-not (air, tilted rotors, products of inertia, a slower lag downwards) is an empty tuple where it is absent, and then
-costs nothing.
+not (air, a battery, tilted rotors, products of inertia, a slower lag downwards) is an empty tuple where it is absent,
+and then costs nothing.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, per_rotor
 from rotorfault.maths.records import Static
 from rotorfault.maths.scalar import Scalar, absolute, less, select, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.battery import Battery
 from rotorfault.model.signals import Wrench
-from rotorfault.model.tilt import Tilt, tilted_rows
+from rotorfault.model.thrust_curve import ThrustCurve
+from rotorfault.model.tilt import Tilt, TiltedRows, tilted_rows
 
 FEWEST_ROTORS, MOST_ROTORS = 3, 16
 """That a vehicle may have."""
@@ -80,6 +82,12 @@ def opposite_pairs(places: Sequence[tuple[float, float]], yaw_signs: Sequence[fl
     return None
 
 
+class Discs(NamedTuple):
+    """What the rotors sweep."""
+
+    radius: Scalar  # m
+
+
 @final
 class Reversible(Static):
     """Says that some rotor may pull down, so that its idle command is not its least one."""
@@ -118,7 +126,11 @@ class Vehicle(NamedTuple):
     gravity: Scalar  # m/s^2
     rotor_reaction: Scalar = 1.0  # share of the reaction to a rotor's change of speed: 1 as physics is, 0 without
     air: Aerodynamics | tuple[()] = ()  # what the air does beyond linear drag; empty where that is nothing
+    curve: ThrustCurve | tuple[()] = ()  # from signal to thrust; empty where the autopilot knows it as it is
+    discs: Discs | tuple[()] = ()  # what rotors sweep; empty where it is not known, and they do not feel the ground
+    battery: Battery | tuple[()] = ()  # the pack; empty for a vehicle of which it is not known
     pairs: Opposite | tuple[()] = ()  # two opposite pairs of rotors, for which much has a closed form; else empty
+    rotor_z: PerRotor | tuple[()] = ()  # m, above the centre of mass; empty where nothing asks for it
     rotor_bandwidth_down: Scalar | tuple[()] = ()  # rad/s, lag of thrust that falls; empty: as of one that rises
     inertia_products: Vec3 | tuple[()] = ()  # kg m^2, elements xy, xz, yz of the inertia matrix; empty: none
     tilt: Tilt | tuple[()] = ()  # axes of the rotors; empty where all point up
@@ -171,10 +183,26 @@ def drag_arms(vehicle: Vehicle) -> PerRotor:
     return arms
 
 
+def rotor_heights(vehicle: Vehicle) -> PerRotor:
+    """Heights in m of the rotors above the centre of mass; 0 where nothing asks for them."""
+    return vehicle.rotor_z if isinstance(vehicle.rotor_z, PerRotor) else PerRotor.all(0.0, vehicle.rotors)
+
+
+def rotor_places(vehicle: Vehicle) -> tuple[Vec3, ...]:
+    """Where the rotors are in m from the centre of mass, body axes."""
+    return tuple(map(Vec3, vehicle.rotor_x, vehicle.rotor_y, rotor_heights(vehicle)))
+
+
+def rows_of_tilted(vehicle: Vehicle) -> TiltedRows:
+    """Force and torque of a newton of each rotor; of a vehicle with tilted rotors."""
+    assert isinstance(vehicle.tilt, Tilt), "no rotor of this vehicle is tilted"
+    return tilted_rows(vehicle.tilt, vehicle.rotor_x, vehicle.rotor_y, rotor_heights(vehicle), drag_arms(vehicle))
+
+
 def wrench_of(vehicle: Vehicle, thrust: PerRotor) -> Wrench:
     """Wrench that rotor thrusts give: the effectiveness matrix times F, equation (4)."""
     if isinstance(vehicle.tilt, Tilt):
-        _, _, up, roll, pitch, yaw = tilted_rows(vehicle.tilt, vehicle.rotor_x, vehicle.rotor_y, drag_arms(vehicle))
+        _, _, up, roll, pitch, yaw = rows_of_tilted(vehicle)
         return Wrench(up.dot(thrust), Vec3(roll.dot(thrust), pitch.dot(thrust), yaw.dot(thrust)))
     return Wrench(
         thrust=thrust.sum(),

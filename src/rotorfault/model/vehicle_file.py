@@ -38,10 +38,11 @@ from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.one_line import cut
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.battery import Battery
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.quantities import (
     AirFile,
+    BatteryFile,
     Inertia,
     Place,
     Product,
@@ -53,8 +54,9 @@ from rotorfault.model.quantities import (
     not_negative,
     positive,
 )
+from rotorfault.model.thrust_curve import STEEPEST
 from rotorfault.model.tilt import Tilt
-from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, ROTOR_NUMBERS, Opposite, Reversible, Vehicle
+from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, ROTOR_NUMBERS, Discs, Opposite, Reversible, Vehicle
 from rotorfault.model.vehicle import opposite_pairs as opposite
 from rotorfault.model.vehicle_rules import RotorSet, hover_refusal, inertia_refusal, level_refusal, reach_refusal
 
@@ -101,6 +103,15 @@ class VehicleFile(Strict):
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
     )
+    thrust_curve: (
+        Annotated[Quantity, in_unit("1", lambda value: -STEEPEST <= value <= STEEPEST, "-1 to 1")] | None
+    ) = Field(
+        default=None, description="1, a of T = T_max (a u^2 + (1 - a) u) for a signal u: THR_MDL_FAC, MOT_THST_EXPO"
+    )
+    rotor_radius: Annotated[Quantity, positive("m")] | None = Field(
+        default=None, description="m, radius of the rotors: with it thrust grows near the ground"
+    )
+    battery: BatteryFile | None = Field(default=None, description="the pack; flown with start.charge")
     air: AirFile | None = Field(default=None, description="what the air does beyond linear drag")
     rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
@@ -108,6 +119,7 @@ class VehicleFile(Strict):
     def _consistent(self) -> VehicleFile:
         for check in (
             self._check_inertia,
+            self._check_battery,
             self._check_count,
             self._check_lists,
             self._check_thrust,
@@ -128,6 +140,11 @@ class VehicleFile(Strict):
 
     def _check_inertia(self) -> PydanticCustomError | None:
         return inertia_refusal(np.array(self._moments), np.array(self._products))
+
+    def _check_battery(self) -> PydanticCustomError | None:
+        if self.battery is None or self.rotor_radius is not None:
+            return None
+        return refusal("rotor_radius", "is not given; a vehicle with [battery] needs it for the power of its rotors")
 
     def _check_count(self) -> PydanticCustomError | None:
         count = len(self.rotor)
@@ -252,8 +269,11 @@ class VehicleFile(Strict):
         """The numbers alone, as Python floats in SI units."""
         places, axes = self.places, self.axes
         tilted = any(rotor.axis is not None for rotor in self.rotor)
+        air = () if self.air is None else self.air.aerodynamics
+        discs = () if self.rotor_radius is None else Discs(self.rotor_radius.value)
+        high = self.centre_of_mass is not None or any(rotor.z is not None for rotor in self.rotor)
+        felt = tilted or air != () or discs != ()
         ahead, left, above = (PerRotor.of(axis[k] for axis in axes) for k in range(3))
-        heights = PerRotor.of(z for _, _, z in places)
         down = () if self.rotor_bandwidth_down is None else self._rotor_number("rotor_bandwidth_down")
         products = self.inertia_xy, self.inertia_xz, self.inertia_yz
         return Vehicle(
@@ -272,29 +292,23 @@ class VehicleFile(Strict):
             linear_drag=self.linear_drag.value,
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
-            air=self._aerodynamics(heights),
+            air=air,
+            battery=self._battery(),
+            discs=discs,
             pairs=self.pairs or (),
+            rotor_z=PerRotor.of(z for _, _, z in places) if high and felt else (),
             rotor_bandwidth_down=down,
             inertia_products=() if products == (None, None, None) else Vec3(*self._products),
-            tilt=Tilt(ahead, left, above, heights) if tilted else (),
+            tilt=Tilt(ahead, left, above) if tilted else (),
             reversible=Reversible() if min(self.of_rotors("thrust_min")) < 0.0 else (),
         )
 
-    def _aerodynamics(self, heights: PerRotor) -> Aerodynamics | tuple[()]:
-        """Coefficients of the air; empty where all are 0, which costs nothing then."""
-        if self.air is None or not any(self.air.number(key) for key in AirFile.model_fields):
+    def _battery(self) -> Battery | tuple[()]:
+        """Numbers of the pack; empty if there is none."""
+        if self.battery is None or self.rotor_radius is None:
             return ()
-        angles, axes = ("roll", "pitch", "yaw"), ("x", "y", "z")
-        return Aerodynamics(
-            rotor_z=heights,
-            rotor_drag=self.air.number("rotor_drag"),
-            inflow=self.air.number("inflow"),
-            translational_lift=self.air.number("translational_lift"),
-            flapping=self.air.number("flapping"),
-            frame_drag=self.air.along("frame_drag", axes),
-            damping=self.air.along("damping", angles),
-            damping_squared=self.air.along("damping_squared", angles),
-        )
+        curve = 1.0 if self.thrust_curve is None else self.thrust_curve.value
+        return self.battery.pack(self.rotor_radius.value, curve)
 
     def quantities(self) -> Iterator[tuple[str, Quantity | RotorQuantity | TripleQuantity]]:
         """Every number of the file under its key, such as ``mass`` or ``rotor.1.x``, with unit and source."""
@@ -308,6 +322,8 @@ class VehicleFile(Strict):
                 yield f"rotor.{number}.z", rotor.z
             if rotor.axis is not None:
                 yield f"rotor.{number}.axis", rotor.axis
+        for key in () if self.battery is None else BatteryFile.model_fields:
+            yield f"battery.{key}", getattr(self.battery, key)
         for key in () if self.air is None else AirFile.model_fields:
             if (coefficient := getattr(self.air, key)) is not None:
                 yield f"air.{key}", coefficient

@@ -32,6 +32,7 @@ def vehicle_text(
     head: Iterable[str],
     numbers: Sequence[tuple[str, Quantity | RotorQuantity]],
     rotors: Iterable[RotorText],
+    air: Sequence[tuple[str, Quantity]] = (),
 ) -> str:
     """The text of a vehicle file.
 
@@ -43,6 +44,8 @@ def vehicle_text(
     numbers : sequence of (str, Quantity or RotorQuantity)
         By key, in the order of the file.
     rotors : iterable of RotorText
+    air : sequence of (str, Quantity), optional
+        Numbers of the table ``[air]``, by key.
     """
     lines = []
     for paragraph in head:
@@ -52,6 +55,8 @@ def vehicle_text(
     for key, quantity in numbers:
         lines += [""] * (key in BREAKS)
         lines.append(f"{key} = {_inline(quantity)}")
+    lines += ["", "[air]"] if air else []
+    lines += [f"{key} = {_inline(quantity)}" for key, quantity in air]
     for rotor in rotors:
         lines += ["", "[[rotor]]", f"name = {_text(rotor.name)}"]
         for key, value in (("x", rotor.x), ("y", rotor.y), ("z", rotor.z)):

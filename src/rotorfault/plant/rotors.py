@@ -139,8 +139,13 @@ def delivered_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> P
 
 def true_rotor_speeds(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
     """Rotor speeds in rad/s, negative where reversed, for lag outputs in N."""
-    sound = output * vehicle.rotor_gain
-    return rotor_speeds(vehicle, _held(sound, fault))
+    return rotor_speeds(vehicle, turning_thrust(vehicle, output, fault))
+
+
+def turning_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
+    """Thrusts in N that sound rotors would give that turn as these do, for lag outputs in N."""
+    sound: PerRotor = output * vehicle.rotor_gain
+    return _held(sound, fault)
 
 
 def _held(followed: PerRotor, fault: RotorFault) -> PerRotor:

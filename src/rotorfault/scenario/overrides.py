@@ -11,8 +11,8 @@ from rotorfault.base.config import is_index
 from rotorfault.base.errors import InputError, short
 from rotorfault.model.vehicle import ROTOR_NUMBERS
 from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.scenario.mismatch import ROTOR_FACTORS
 from rotorfault.scenario.part import change_kind, change_preset
-from rotorfault.scenario.scenario import ROTOR_FACTORS
 from rotorfault.scenario.slots import SLOTS
 
 LISTED = (*ROTOR_NUMBERS, "rotor_bandwidth_down")

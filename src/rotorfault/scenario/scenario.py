@@ -12,13 +12,11 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeVar, cast
+from typing import Annotated, Any, TypeVar, cast
 
 from pydantic import (
     BeforeValidator,
     Field,
-    PlainSerializer,
-    PlainValidator,
     ValidationError,
     create_model,
     model_validator,
@@ -32,15 +30,13 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.foreign import is_place
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.model.block import TimeGrid
-from rotorfault.model.quantities import one_or_each, plain
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.model.vehicle_changes import Factor as RotorFactor
-from rotorfault.model.vehicle_changes import with_factors
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
+from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part, field_of
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.time_grid import require_flyable, require_on_grid
@@ -51,9 +47,6 @@ ROUNDING = 1e-12  # relative, of a time over another
 PERIOD_TOLERANCE = 1e-9  # relative: how exactly the step must divide the sampling period
 MOST_SEED = 10**12
 MOST_SUBSTEPS = 1000  # per sampling period
-MOST_SHIFT = 10.0  # m, of a centre of mass: more is no mismatch
-ROTOR_FACTORS = ("rotor_bandwidth", "rotor_gain", "thrust_max", "thrust_coefficient", "torque_ratio")
-"""Of a mismatch: one number, or one for each rotor."""
 MOST_RECORDS = 4e6  # of about 1.2 kB each, held in memory
 
 
@@ -69,6 +62,9 @@ class Start(Strict):
     velocity: Three = Field(default=(0.0, 0.0, 0.0), description="[m/s], world frame")
     attitude: tuple[Lean, Lean, Heading] = Field(default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]")
     body_rates: tuple[Rate, Rate, Rate] = Field(default=(0.0, 0.0, 0.0), description="[rad/s], body frame")
+    charge: float | None = Field(
+        default=None, gt=0.0, le=1.0, description="of the battery, 1 full; the voltage is constant if not given"
+    )
 
     @model_validator(mode="after")
     def _upright(self) -> Start:
@@ -82,70 +78,6 @@ class Start(Strict):
                 f"flight is lost; {meant}",
             )
         return self
-
-
-Factor = Annotated[float, Field(gt=0.0)]
-
-
-def _factors(value: object) -> float | tuple[float, ...]:
-    found = one_or_each(value)
-    for factor in found if isinstance(found, tuple) else (found,):
-        if not factor > 0.0:
-            raise refusal(
-                "", f"got {factor!r}; allowed: greater than 0, one number or a list with one for each rotor"
-            )
-    return found
-
-
-class EachRotor(NamedTuple):
-    """Marks a setting that may be one number or a list with one for each rotor; for readers."""
-
-    gt: float  # that each is greater than
-
-
-Factors = Annotated[
-    float | tuple[float, ...],
-    PlainValidator(_factors),
-    PlainSerializer(plain, return_type=float | list[float]),
-    EachRotor(0.0),
-]
-"""One for all rotors, or one for each."""
-Shift = Annotated[float, Field(ge=-MOST_SHIFT, le=MOST_SHIFT)]
-
-
-class Mismatch(Strict):
-    """Factors on the true vehicle that the autopilot does not know of: 1.1 is ten percent more than believed."""
-
-    mass: Factor = 1.0
-    inertia: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
-    rotor_bandwidth: Factors = 1.0
-    rotor_gain: Factors = 1.0
-    thrust_max: Factors = 1.0
-    thrust_coefficient: Factors = 1.0
-    torque_ratio: Factors = 1.0
-    linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
-    centre_of_mass: tuple[Shift, Shift, Shift] = Field(
-        default=(0.0, 0.0, 0.0), description="true less believed centre of mass: forward, left, up [m]"
-    )
-
-    def applied(self, vehicle: VehicleFile) -> Vehicle:
-        """The true vehicle for a believed one.
-
-        Raises
-        ------
-        PydanticCustomError
-            If there is no such vehicle: it keeps the rules of a vehicle file.
-        """
-        x, y, z = self.inertia
-        factors: dict[str, RotorFactor] = {
-            name: getattr(self, name) for name in ("mass", *ROTOR_FACTORS, "linear_drag")
-        }
-        factors |= {"inertia_x": x, "inertia_y": y, "inertia_z": z}
-        try:
-            return with_factors(vehicle, factors, self.centre_of_mass).vehicle
-        except PydanticCustomError as error:
-            about = error.context or {}
-            raise refusal("mismatch", f"the true vehicle: {about.get('key')}: {error.message()}") from None
 
 
 def _vehicle(value: Any) -> VehicleFile:
@@ -178,6 +110,9 @@ class Scenario(Strict):
         default=None, gt=0.0, description="time between two records [s]; the sampling period if not given"
     )
     seed: int = Field(default=0, ge=0, le=MOST_SEED, description="names the random numbers of sensor noise and gusts")
+    voltage_compensation: bool = Field(
+        default=False, description="whether the autopilot sends more signal as the voltage of the battery falls"
+    )
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
 
@@ -245,6 +180,7 @@ class Scenario(Strict):
                 f"{self.steps / self.every:.3g} records take more memory than there is; allowed: up to "
                 f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
             )
+        self._require_battery()
         require_flyable(self.mismatch.applied(self.vehicle), self.grid)
         count = len(self.vehicle.rotor)
         for number, fault in enumerate(self.all(FAULT)):
@@ -261,6 +197,15 @@ class Scenario(Strict):
             elif (one := self.maybe(slot)) is not None:
                 require_on_grid(one, slot.name, self.grid)
         return self
+
+    def _require_battery(self) -> None:
+        name = cut(self.vehicle.name)
+        if self.start.charge is not None and self.vehicle.battery is None:
+            raise refusal("start.charge", f"got {self.start.charge:g}, but vehicle '{name}' has no [battery]")
+        if self.voltage_compensation and self.start.charge is None:
+            raise refusal(
+                "voltage_compensation", "got true, but the voltage is constant; give start.charge, such as 1.0"
+            )
 
     @property
     def grid(self) -> TimeGrid:

@@ -22,8 +22,8 @@ import numpy as np
 from rotorfault.base.config import refusal
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.block import TimeGrid
-from rotorfault.model.tilt import Tilt, tilted_rows
-from rotorfault.model.vehicle import Vehicle, drag_arms, inertia_matrix
+from rotorfault.model.tilt import Tilt
+from rotorfault.model.vehicle import Vehicle, inertia_matrix, rows_of_tilted
 from rotorfault.scenario.part import Part
 
 FASTEST_DECAY = 0.5  # of 1 / step: then the step is right to 0.03 % of what decays
@@ -91,7 +91,7 @@ def _moments(vehicle: Vehicle) -> Vec3:
 def _levers(vehicle: Vehicle, about_yaw: float) -> list[float]:
     """Half the sums of the rotors' levers about roll, pitch and yaw in m."""
     if isinstance(vehicle.tilt, Tilt):
-        rows = tilted_rows(vehicle.tilt, vehicle.rotor_x, vehicle.rotor_y, drag_arms(vehicle))
+        rows = rows_of_tilted(vehicle)
         return [sum(map(abs, row)) / 2.0 for row in (rows.roll, rows.pitch, rows.yaw)]
     return [sum(map(abs, vehicle.rotor_y)) / 2.0, sum(map(abs, vehicle.rotor_x)) / 2.0, about_yaw]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -200,12 +201,30 @@ def test_moments_that_no_body_has_are_refused() -> None:
 
 def test_the_hummingbird_of_rotorpy_has_the_numbers_of_ours() -> None:
     pytest.importorskip("rotorpy")
-    made = rf.import_vehicle("rotorpy", "rotorpy.vehicles.hummingbird_params:quad_params", "h", estimate=True).vehicle
+    file = rf.import_vehicle("rotorpy", "rotorpy.vehicles.hummingbird_params:quad_params", "h", estimate=True)
+    made = file.vehicle
     known = rf.load_vehicle("hummingbird").vehicle
     for key in ("mass", "inertia", "thrust_coefficient"):
         assert getattr(made, key) == getattr(known, key)
     assert made.torque_ratio == pytest.approx(known.torque_ratio, rel=1e-3)
-    assert made.linear_drag == pytest.approx(known.linear_drag, rel=2e-3)
+    # What ours has for the drag of rotors in hover is theirs times the speeds of their rotors; here it is in the air.
+    speeds = math.sqrt(4.0 * made.mass * made.gravity / made.thrust_coefficient)
+    assert made.air.rotor_drag * speeds == pytest.approx(known.linear_drag, rel=2e-3)
+    assert made.linear_drag == 0.0
+
+
+def test_what_the_air_does_in_rotorpy_comes_along(tmp_path: Path) -> None:
+    text = CRAZYFLIE.read_text(encoding="utf-8")
+    numbers = ", ".join(
+        f'"{key}": {k}e-6' for k, key in enumerate(("k_d", "k_z", "k_h", "k_flap", "c_Dx", "c_Dz"), 1)
+    )
+    path = tmp_path / "mine.py"
+    path.write_text(text + f"\nquad_params = {{**quad_params, {numbers}}}\n", encoding="utf-8")
+    options = {"inertia": (1.43e-5, 1.43e-5, 2.86e-5), "estimate": True, "allow_code": True}
+    air = rf.import_vehicle("rotorpy", f"{path}:quad_params", "cf", **options, out=tmp_path / "cf.toml").vehicle.air
+    assert (air.rotor_drag, air.inflow, air.translational_lift, air.flapping) == (1e-6, 2e-6, 3e-6, 4e-6)
+    assert list(air.frame_drag)[::2] == [5e-6, 6e-6]
+    assert rf.load_vehicle(tmp_path / "cf.toml").vehicle.air == air
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,8 @@ from rotorfault.flight.assembly import Group, numbers_of
 from rotorfault.flight.sweep import checked_columns, groups_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.records import unflatten
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.model.likeness import alike, bare
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.scenario.scenario import Scenario
 
@@ -123,11 +124,13 @@ def _physics(scenario: Scenario, varied: Columns, count: int) -> Physics | None:
         physics = _physics_of(group)
         if physics is None:
             return None
-        parts.append((group.flights, rows_of(physics, len(group.flights)), physics))
-    rows = np.empty((len(parts[0][1]), count))
-    for flights, some, _ in parts:
-        rows[:, flights] = some
-    return unflatten(parts[0][2], list(rows))
+        parts.append((group.flights, physics))
+    vehicles = alike([physics.vehicle for _, physics in parts])
+    found = [physics._replace(vehicle=vehicle) for (_, physics), vehicle in zip(parts, vehicles, strict=True)]
+    rows = np.empty((len(flatten(found[0])), count))
+    for (flights, _), physics in zip(parts, found, strict=True):
+        rows[:, flights] = rows_of(physics, len(flights))
+    return unflatten(found[0], list(rows))
 
 
 def _physics_of(group: Group) -> Physics | None:
@@ -140,6 +143,7 @@ def _physics_of(group: Group) -> Physics | None:
         lasting = np.where(fault.onset(record) < group.scenario.duration, 1.0 - loss, 1.0)
         remaining[fault.rotor - 1] = remaining[fault.rotor - 1] * lasting
     wind_W = loop.plant.wind.mean_velocity(numbers.parts.wind)
-    if wind_W is None:
+    # What a battery leaves of the greatest thrust depends on the flight.
+    if wind_W is None or loop.battery:
         return None
-    return Physics(numbers.vehicle, PerRotor.of(1.0 - share for share in remaining), wind_W)
+    return Physics(bare(numbers.vehicle), PerRotor.of(1.0 - share for share in remaining), wind_W)

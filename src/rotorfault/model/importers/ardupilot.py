@@ -19,6 +19,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.model.frames import ALIASES, FRAMES
 from rotorfault.model.importers.draft import Draft
 from rotorfault.model.importers.frame_match import distance, number_of
+from rotorfault.model.importers.numbers import quantity
 from rotorfault.model.importers.params_text import Params, read_params
 from rotorfault.model.vehicle_file import VehicleFile
 
@@ -70,7 +71,11 @@ def read_ardupilot(path: str | Path) -> Draft:
     about = f"{where}, parameters of ArduPilot"
     source = f"{where}: FRAME_CLASS {kind}, FRAME_TYPE {type_}"
     hover, least = _shares(params)
-    return Draft(where, about, (), {}, FRAMES[BY_NUMBERS[kind, type_]], source, hover, least)
+    known = {}
+    if params.has("MOT_THST_EXPO"):
+        expo = params.number("MOT_THST_EXPO")
+        known["thrust_curve"] = quantity("thrust_curve", expo, f"{where}: MOT_THST_EXPO")
+    return Draft(where, about, (), known, FRAMES[BY_NUMBERS[kind, type_]], source, hover, least)
 
 
 def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
@@ -110,6 +115,8 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
         f"FRAME_TYPE,{type_}",
         f"MOT_THST_HOVER,{hover:.9g}",
     ]
+    if vehicle.thrust_curve is not None:
+        lines.append(f"MOT_THST_EXPO,{vehicle.thrust_curve.value:.9g}")
     return ArduPilotParams("\n".join(lines) + "\n", best, fits[best], distance(vehicle, FRAMES[best], fits[best]))
 
 

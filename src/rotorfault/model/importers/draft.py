@@ -73,6 +73,7 @@ class Draft(NamedTuple):
     hover_share: tuple[float, str] | None = None  # thrust in hover over the greatest thrust, and its source
     least_share: tuple[float, str] | None = None  # least thrust over the greatest, and its source
     notes: tuple[str, ...] = ()  # what of the source is left out, a line each
+    air: tuple[tuple[str, Quantity], ...] = ()  # what the air does beyond linear drag, by key of the table [air]
 
 
 class Imported(NamedTuple):
@@ -129,6 +130,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
             RotorText(one.label, one.x, one.y, "+" if one.clockwise else "-", one.source, one.z, one.axis)
             for one in rotors
         ],
+        draft.air,
     )  # fmt: skip
     file = validate(VehicleFile, parse_toml(text, draft.where), draft.where)
     return Imported(file, text, rotors, draft.notes, tuple(estimated))

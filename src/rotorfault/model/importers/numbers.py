@@ -34,9 +34,15 @@ OPTIONAL = {
     "inertia_xz": "kg m^2",
     "inertia_yz": "kg m^2",
     "rotor_bandwidth_down": "rad/s",
+    "thrust_curve": "1",
+    "rotor_radius": "m",
 }
-"""Numbers that it may have."""
-AFTER = {"inertia_z": ("inertia_xy", "inertia_xz", "inertia_yz"), "rotor_bandwidth": ("rotor_bandwidth_down",)}
+"""Numbers that it may have; nobody is asked for them."""
+AFTER = {
+    "inertia_z": ("inertia_xy", "inertia_xz", "inertia_yz"),
+    "rotor_bandwidth": ("rotor_bandwidth_down",),
+    "rotor_reaction": ("thrust_curve", "rotor_radius"),
+}
 ORDER = [key for required in UNITS for key in (required, *AFTER.get(required, ()))]
 """All of them in the order of the file."""
 

@@ -4,9 +4,9 @@ PX4 has the geometry in ``CA_ROTORi_PX``, ``PY``, ``PZ`` in m about the centre o
 *down*, and the axis of thrust in ``AX``, ``AY``, ``AZ``, (0, 0, -1) being up. ``CA_ROTORi_KM`` is drag torque over
 thrust in m, positive for a propeller that turns counter-clockwise seen from above, against its axis.
 ``CA_ROTORi_CT`` is the thrust in N at full signal; 6.5 is its default, which says nothing. ``MPC_THR_HOVER`` is the
-thrust in hover over the greatest one, in so far as ``THR_MDL_FAC`` describes the motors. Rotor i is PX4's motor
-i + 1. Where the file has no geometry, the generic airframe that ``SYS_AUTOSTART`` names has one, and the arm is to be
-given.
+thrust in hover over the greatest one, in so far as ``THR_MDL_FAC``, the a of `rotorfault.model.thrust_curve`,
+describes the motors. Rotor i is PX4's motor i + 1. Where the file has no geometry, the generic airframe that
+``SYS_AUTOSTART`` names has one, and the arm is to be given.
 
 Sources: PX4's parameter reference, and `module.yaml` of its control allocator.
 """
@@ -20,8 +20,9 @@ from rotorfault.base.errors import InputError
 from rotorfault.model.frames import ALIASES, FRAMES
 from rotorfault.model.importers.draft import Draft, SourceRotor, levels
 from rotorfault.model.importers.frame_match import number_of
-from rotorfault.model.importers.numbers import rotor_quantity
+from rotorfault.model.importers.numbers import quantity, rotor_quantity
 from rotorfault.model.importers.params_text import Params, read_params
+from rotorfault.model.quantities import Quantity, RotorQuantity
 from rotorfault.model.vehicle import MOST_ROTORS
 from rotorfault.model.vehicle_file import VehicleFile
 
@@ -29,6 +30,7 @@ CT, KM = 6.5, 0.05  # PX4's defaults
 UPWARD = {"X": 0.0, "Y": 0.0, "Z": -1.0}  # the axis of a rotor that is not tilted
 HOVER = (0.05, 0.95)  # what MPC_THR_HOVER may be to be believed
 AIRFRAMES = {int(alias[4:]): name for alias, name in ALIASES.items() if alias.startswith("px4-")}
+CURVES = (0.0, 1.0)  # what THR_MDL_FAC may be
 INT32, FLOAT = 6, 9  # types of MAVLink, as QGroundControl writes them
 
 
@@ -50,10 +52,10 @@ def read_px4(path: str | Path) -> Draft:
     if (kind := params.whole("CA_AIRFRAME", 0)) != 0:
         raise InputError(f"{where}: CA_AIRFRAME is {kind}; allowed: 0, a multirotor with fixed rotors")
     about = f"{where}, parameters of PX4"
-    hover = _hover(params)
+    hover, curve = _hover(params), _curve(params)
     count = params.whole("CA_ROTOR_COUNT", 0)
     if count == 0:
-        return _generic(params, about, hover)
+        return _generic(params, about, hover)._replace(known=curve)
     if not 0 < count <= MOST_ROTORS:
         raise InputError(f"{where}: CA_ROTOR_COUNT is {count}; allowed: 3 to {MOST_ROTORS}")
     indices = range(count)
@@ -61,12 +63,13 @@ def read_px4(path: str | Path) -> Draft:
     moment = [params.number(f"CA_ROTOR{i}_KM", KM) for i in indices]
     if 0.0 in moment:
         raise InputError(f"{where}: CA_ROTOR{moment.index(0.0)}_KM is 0; its sign says how the propeller turns")
-    known = {
+    known: dict[str, Quantity | RotorQuantity] = {
+        **curve,
         "torque_ratio": rotor_quantity(
             "torque_ratio",
             map(abs, moment),
             f"{where}: CA_ROTORi_KM" + ("" if params.has("CA_ROTOR0_KM") else ", PX4's default"),
-        )
+        ),
     }
     full = [params.number(f"CA_ROTOR{i}_CT", CT) for i in indices]
     if any(thrust != CT for thrust in full) and min(full) > 0.0:
@@ -110,6 +113,9 @@ def px4_text(vehicle: VehicleFile) -> str:
         }  # fmt: skip
         rows += [(f"CA_ROTOR{i}_{key}", value, FLOAT) for key, value in numbers.items()]
     rows.append(("MPC_THR_HOVER", 1.0 / vehicle.thrust_to_weight, FLOAT))
+    curve = vehicle.thrust_curve
+    if curve is not None and CURVES[0] <= curve.value <= CURVES[1]:
+        rows.append(("THR_MDL_FAC", curve.value, FLOAT))
     head = [
         f"# Vehicle '{vehicle.name}', written by rotorfault for PX4: geometry and thrust, no gains.",
         "# Compare each motor's place and sense of rotation with the vehicle before it flies.",
@@ -141,6 +147,16 @@ def _generic(params: Params, about: str, hover: tuple[float, str] | None) -> Dra
         )
     source = f"{params.where}: SYS_AUTOSTART {number}"
     return Draft(params.where, about, (), {}, FRAMES[AIRFRAMES[number]], source, hover)
+
+
+def _curve(params: Params) -> dict[str, Quantity]:
+    """The curve from signal to thrust, where the file says it."""
+    if not params.has("THR_MDL_FAC"):
+        return {}
+    value = params.number("THR_MDL_FAC")
+    if not CURVES[0] <= value <= CURVES[1]:
+        raise InputError(f"{params.where}: THR_MDL_FAC is {value:g}; allowed: {CURVES[0]:g} to {CURVES[1]:g}")
+    return {"thrust_curve": quantity("thrust_curve", value, f"{params.where}: THR_MDL_FAC")}
 
 
 def _hover(params: Params) -> tuple[float, str] | None:
