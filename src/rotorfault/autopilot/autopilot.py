@@ -17,7 +17,7 @@ from rotorfault.autopilot.instant import Decision, Instant, Past
 from rotorfault.autopilot.rotor_model import expected_thrust, follow, rotors_at_hover
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import record_type
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.block import Block, Record
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Allocation, Command, Readings, Reference, Wrench, healthy, motion_of
@@ -174,7 +174,7 @@ class Autopilot:
         relief = decision.relief
         if isinstance(relief, tuple):
             return allocation
-        least = instant.vehicle.thrust_min
+        least = maximum(instant.vehicle.thrust_min, 0.0)  # at rest, where rotors can turn backwards
         command = allocation.command.map(lambda f: least + (f - least) * (1.0 - relief))
         return account(instant.vehicle, wrench, decision.diagnosis, command)
 

@@ -61,7 +61,9 @@ class VehicleFile(Strict):
         description="N/(rad/s)^2, thrust per squared rotor speed"
     )
     torque_ratio: Annotated[Quantity, positive("m")] = Field(description="m, drag torque over thrust (kappa)")
-    thrust_min: Thrust = Field(description="N, least thrust of a rotor")
+    thrust_min: Annotated[Quantity, in_unit("N")] = Field(
+        description="N, least thrust of a rotor; below 0 for rotors that can turn backwards"
+    )
     thrust_max: Thrust = Field(description="N, greatest thrust of a rotor")
     rotor_bandwidth: Annotated[Quantity, positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
     rotor_gain: Annotated[Quantity, positive("1")] = Field(description="thrust per commanded thrust (k)")
@@ -151,6 +153,9 @@ class VehicleFile(Strict):
         low, high = self.thrust_min.value, self.thrust_max.value
         if not low < high:
             return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
+        if not low >= -high:
+            message = f"got {low!r} N; allowed: -thrust_max = {-high!r} N or more, for rotors that can turn backwards"
+            return refusal("thrust_min", message)
         ratio = self.thrust_to_weight
         hover = self.mass.value * self.gravity.value / (len(self.rotor) * self.rotor_gain.value)
         if not ratio > 1.0:

@@ -49,7 +49,8 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = Non
     high = effect * vehicle.thrust_max + stuck.thrust
     if vehicle.pairs == ():
         share = effect * (1.0 / vehicle.rotor_gain)
-        limits = limits_of(effect * vehicle.thrust_min + stuck.thrust, high, share)
+        # Rotors that can turn backwards begin at rest: there they are balanced, whatever each has lost.
+        limits = limits_of(effect * maximum(vehicle.thrust_min, 0.0) + stuck.thrust, high, share)
         with_yaw, without_yaw = most_thrust(effectiveness(vehicle), limits, STEPS)
         return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
     most = in_pairs(vehicle, high)

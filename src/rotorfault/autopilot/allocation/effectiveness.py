@@ -105,6 +105,10 @@ def allocated(
     effect = effect_of(vehicle, diagnosis.loss, stuck)
     dead = stuck.effectiveness(diagnosis.loss).map(lambda left: less(left, effectiveness_min))
     least = diagnosis.test.map(lambda f: maximum(f / vehicle.rotor_gain, vehicle.thrust_min))
+    if vehicle.pairs == ():
+        # A rotor that can turn backwards does so, unless it is tested or dead.
+        tested = diagnosis.test.map(lambda f, is_dead: either(is_dead, less(0.0, f)), dead)
+        least = tested.map(lambda on, f: select(on, f, vehicle.thrust_min), least)
     low = effect * least + stuck.thrust
     high = dead.map(select, low, effect * vehicle.thrust_max + stuck.thrust)
 
