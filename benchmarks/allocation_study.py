@@ -5,12 +5,12 @@
 Every case is a frame of its own: 3 to 16 rotors on a circle, an ellipse, in coaxial pairs or anywhere, alternating or
 random turns; each rotor with limits of its own, from 0, from a least thrust, or reversible; up to three rotors weak,
 dead or stuck; and a demand that is the wrench of thrusts within the limits, at them, or beyond them. Quadrotors with
-opposite pairs are among them. Numbers are in units of the largest thrust of a rotor, and the rows of the effectiveness
-have length 1, so a miss of 0.01 is a hundredth of what a rotor can give.
+opposite pairs are among them. Numbers are in units of the largest thrust of a rotor, and the rows of the
+effectiveness have length 1, so a miss of 0.01 is a hundredth of what a rotor can give.
 
-The reference is the lexicographic optimum: the nearest tilt torque by bounded least squares (scipy `lsq_linear`), then
-the nearest thrust with this tilt, then the nearest yaw torque with both, by linear programs (HiGHS). Whether a demand
-is attainable is what these say; `lsq_linear` on all four rows is asked too, and must agree.
+The reference is the lexicographic optimum: the nearest tilt torque by bounded least squares (scipy `lsq_linear`),
+then the nearest thrust with this tilt, then the nearest yaw torque with both, by linear programs (HiGHS). Whether a
+demand is attainable is what these say; `lsq_linear` on all four rows is asked too, and must agree.
 
 Told of each allocator: what it misses of attainable demands, and of others by how much its first miss that is not the
 least (tilt, then thrust, then yaw) is beyond the least. `nearest` is what flies any frame, `pairs` the closed form on
@@ -180,8 +180,8 @@ def _least_miss(cases: Cases, row: int, thrust: Array, tilt: Array) -> Array:
     count, n = cases.low.shape
     held = [UP, ROLL, PITCH] if thrust.shape[1] else [ROLL, PITCH]
     right = np.concatenate([thrust[:, :, 0], tilt], axis=1)
-    # Unknowns of a case: thrusts, miss upwards, miss downwards, and help either way for each held row. What is held is
-    # known to rounding only, so help is there, at a price that is never worth it.
+    # Unknowns of a case: thrusts, miss upwards, miss downwards, and help either way for each held row. What is held
+    # is known to rounding only, so help is there, at a price that is never worth it.
     help_ = 2 * len(held)
     rows = np.zeros((count, len(held) + 1, n + 2 + help_))
     rows[:, :-1, :n], rows[:, -1, :n] = cases.rows[:, held], cases.rows[:, row]
@@ -260,7 +260,9 @@ def by_inverse(cases: Cases) -> Array:
 
 def pairs_of(rows: Array) -> tuple[int, ...] | None:
     """The order of opposite pairs of rotors, where there are two."""
-    found = opposite_pairs([(-x, y) for x, y in zip(rows[PITCH], rows[ROLL], strict=True)], np.sign(rows[YAW]).tolist())
+    found = opposite_pairs(
+        [(-x, y) for x, y in zip(rows[PITCH], rows[ROLL], strict=True)], np.sign(rows[YAW]).tolist()
+    )
     return None if found is None else found.order
 
 
@@ -293,9 +295,12 @@ ALLOCATORS: dict[str, Callable[[Cases], Array]] = {
 
 def excess(cases: Cases, optimum: Best, thrust: Array) -> Array:
     """By how much the first miss of each case that is not the least is beyond it; NaN without thrusts."""
-    assert not (thrust < cases.low - MET).any() and not (thrust > cases.high + MET).any()
+    assert not (thrust < cases.low - MET).any()
+    assert not (thrust > cases.high + MET).any()
     off = np.einsum("ckn,cn->ck", cases.rows, thrust) - cases.demand
-    missed = np.stack([np.linalg.norm(off[:, [ROLL, PITCH]], axis=1), np.abs(off[:, UP]), np.abs(off[:, YAW])], axis=1)
+    missed = np.stack(
+        [np.linalg.norm(off[:, [ROLL, PITCH]], axis=1), np.abs(off[:, UP]), np.abs(off[:, YAW])], axis=1
+    )
     beyond = missed - optimum.missed
     first = np.argmax(beyond > EXACT, axis=1)  # the first of them if there is none
     found = np.maximum(beyond[np.arange(len(beyond)), first], 0.0)

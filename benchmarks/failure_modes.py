@@ -3,12 +3,12 @@
     python benchmarks/failure_modes.py [--flights 100] [--seed 1] [--loads 1 1.35] [--out failure_modes.json]
 
 Hover 5 m above ground in wind and gusts, with noisy sensors; after 1 s (to 1.3 s) one rotor loses all of its thrust.
-The diagnosis finds out (Luenberger observer), nobody is told. Every rotor of every vehicle is lost in so many flights,
-each with a direction of the wind, gusts and noise of its own, the same for all allocators:
+The diagnosis finds out (Luenberger observer), nobody is told. Every rotor of every vehicle is lost in so many
+flights, each with a direction of the wind, gusts and noise of its own, the same for all allocators:
 
     sequential, ignore            PX4's desaturation, CA_FAILURE_MODE 0
     sequential, stop_opposite     1: the failed rotor is taken out, its opposite stopped
-    sequential, reverse_opposite  2: the failed rotor is taken out, its opposite may be reversed down to -0.4 thrust_max
+    sequential, reverse_opposite  2: the failed rotor is taken out, its opposite reversed, to -0.4 thrust_max at most
     effectiveness                 the rotors that are left, in strict order tilt, thrust, yaw
     effectiveness, reversible     the same where every rotor may be reversed down to -0.4 thrust_max
 
@@ -161,7 +161,16 @@ def study(chosen: argparse.Namespace) -> dict[str, Any]:
 
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """The table in words."""
-    head = ["vehicle", "T/W", "allocation", "lost", "95 %", "height lost, worst [m]", "yaw error [deg]", "rate [rad/s]"]
+    head = [
+        "vehicle",
+        "T/W",
+        "allocation",
+        "lost",
+        "95 %",
+        "height lost, worst [m]",
+        "yaw error [deg]",
+        "rate [rad/s]",
+    ]
     head.append("lost of rotor 1 to 6")
     cells = [
         [

@@ -1,10 +1,10 @@
 r"""What thrusts of more than four rotors leave free: changes of them without any wrench, and what they are good for.
 
-All thrusts with one wrench w are :math:`F = F_0 + N z`, with :math:`B F_0 = w` and the columns of N a basis of the null
-space of the effectiveness B. Of these thrusts allocation takes those with the least sum of squared loads, thrusts over
-what each rotor can give (`rotorfault.autopilot.allocation.nearest`). How well that keeps rotors from their limits is
-said by the *headroom*: the least distance of a thrust from its limits, as a share of its rotor's range. The largest
-that there can be is found by a linear program,
+All thrusts with one wrench w are :math:`F = F_0 + N z`, with :math:`B F_0 = w` and the columns of N a basis of the
+null space of the effectiveness B. Of these thrusts allocation takes those nearest to the middle between their limits,
+by least squares of the distance over what each rotor can give (`rotorfault.autopilot.allocation.nearest`). How well
+that keeps rotors from their limits is said by the *headroom*: the least distance of a thrust from its limits, as a
+share of its rotor's range. The largest that there can be is found by a linear program,
 
 .. math:: \max s, \qquad B F = w, \qquad l_i + s\,(h_i - l_i) \le F_i \le h_i - s\,(h_i - l_i) .
 """
@@ -33,6 +33,7 @@ from rotorfault.model.vehicle_check import most_torque
 
 RANK = 1e-9  # of the largest singular value of rows of length 1: less is 0 but for rounding
 DEAD = Effectiveness.Settings().effectiveness_min
+AXES_OF_WRENCH = 4
 AXES = (Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 
 
@@ -47,7 +48,7 @@ class NullSpace(NamedTuple):
 
 
 class Headroom(NamedTuple):
-    """Least distance of a thrust from its limits in hover, over the rotor's range: 0.5 in the middle, below 0 beyond."""
+    """Least distance of a thrust from its limits in hover, over the rotor's range: up to 0.5, below 0 beyond."""
 
     inverse: float  # of the thrusts with the least sum of squares
     allocated: float  # of those that allocation takes
@@ -116,9 +117,10 @@ def hover_headroom(vehicle: Vehicle, loss: PerRotor) -> Headroom | None:
     rows, needed = problem.effectiveness / size[:, None], problem.needed / size
     span, unit = (high - low)[live], float(needed[0])
     kept = rows[:, live]
+    each, ones = np.diag(1.0 / span), np.ones((len(span), 1))
     answer = linprog(
-        np.append(np.zeros(int(live.sum())), -1.0),
-        A_ub=np.block([[-np.diag(1.0 / span), np.ones((len(span), 1))], [np.diag(1.0 / span), np.ones((len(span), 1))]]),
+        np.append(np.zeros(len(span)), -1.0),
+        A_ub=np.block([[-each, ones], [each, ones]]),
         b_ub=np.concatenate([-low[live] / span, high[live] / span]),
         A_eq=np.column_stack([kept / unit, np.zeros(4)]),
         b_eq=needed / unit,
@@ -133,14 +135,13 @@ def hover_headroom(vehicle: Vehicle, loss: PerRotor) -> Headroom | None:
 
     belief = healthy(vehicle.rotors)._replace(loss=loss, flagged=loss.map(lambda x: float(x > 0.0)))
     command = allocated(vehicle, Wrench(vehicle.mass * vehicle.gravity, zeros()), belief, DEAD).command
-    inverse = np.linalg.pinv(kept) @ needed
     plain = np.zeros(vehicle.rotors)
-    plain[live] = inverse
+    plain[live] = np.linalg.pinv(kept) @ needed
     return Headroom(least(plain), least(np.array([*(command * effect)])), float(answer.x[-1]))
 
 
 def null_space_lines(vehicle: Vehicle, loss: PerRotor) -> list[str]:
-    """What is free of a vehicle's thrusts and what it gives, as text within 100 columns; none for four rotors or fewer.
+    """What is free of a vehicle's thrusts and what it gives, as text within 100 columns; none for up to four rotors.
 
     Parameters
     ----------
@@ -149,16 +150,15 @@ def null_space_lines(vehicle: Vehicle, loss: PerRotor) -> list[str]:
     loss : PerRotor
         Of each rotor, 0 to 1.
     """
+    if vehicle.rotors <= AXES_OF_WRENCH:
+        return []
     dead = [number for number, x in enumerate(loss, start=1) if 1.0 - x < DEAD]
     found = null_space(vehicle, dead)
-    if vehicle.rotors <= len(AXES) + 1:
-        return []
-    live = vehicle.rotors - len(dead)
-    lines = [f"Null space: {found.dimension} of {live} thrusts are free, for any wrench"]
+    lines = [f"Null space: {found.dimension} of {vehicle.rotors - len(dead)} thrusts are free, for any wrench"]
     room = hover_headroom(vehicle, loss)
     if room is None:
         return [*lines, "  no hover with yaw held"]
-    shares = [f"{100.0 * share:.1f} %" for share in room]
+    shares = [f"{100.0 * share:.1f} %".replace("-0.0 ", "0.0 ") for share in room]
     rows = [
         ("headroom in hover", f"{shares[1]} of a rotor's range as allocated ({shares[0]} by the inverse, "
          f"{shares[2]} at best)"),
@@ -167,11 +167,12 @@ def null_space_lines(vehicle: Vehicle, loss: PerRotor) -> list[str]:
         hover = hover_thrust(vehicle)
         along = [most_torque(vehicle, hover, axis) for axis in AXES]
         free = [*torque_reserve(vehicle, loss)]
-        gain = ", ".join(
-            f"{one:.3g} ({100.0 * (one / other - 1.0):+.0f} %)" if other > 0.0 else f"{one:.3g}"
+        torque = ", ".join(f"{one:.3g}" for one in free)
+        more = ", ".join(
+            f"{100.0 * (one / other - 1.0):+.0f}" if other > 0.0 else "-"
             for one, other in zip(free, along, strict=True)
         )
-        rows.append(("torque in reserve", f"{gain} N m about roll, pitch, yaw (beside the inverse)"))
+        rows.append(("torque in reserve", f"{torque} N m about roll, pitch, yaw ({more} % beside the inverse)"))
     return [*lines, *table_lines(rows, "<<", indent=2)]
 
 

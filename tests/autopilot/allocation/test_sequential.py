@@ -27,7 +27,7 @@ HEXA = load_vehicle("du-pnpnpn").vehicle
 REVERSIBLE = HEXA._replace(thrust_min=-0.4 * HEXA.thrust_max)
 WEIGHT = HEXA.mass * HEXA.gravity
 LEVEL = Wrench(WEIGHT, Vec3(0.0, 0.0, 0.0))
-# A quadrotor on which a newton is a share of the largest thrust, as PX4 counts: rotors front and rear, right and left.
+# A quadrotor on which a newton is a share of the largest thrust, as PX4 counts: front and rear, right and left.
 UNIT = PAPER._replace(thrust_min=0.0, thrust_max=1.0, rotor_gain=1.0)
 
 
@@ -173,7 +173,7 @@ def test_where_rotors_cannot_turn_backwards_it_is_refused() -> None:
 
 @pytest.mark.parametrize("off", [0.0, 0.002, 0.006])
 def test_axes_that_fall_together_are_dropped(off: float) -> None:
-    """With two opposite rotors out of six, yaw is pitch in disguise; nearly so where rotors are not quite in place."""
+    """With two opposite rotors out of six, yaw is pitch in disguise; nearly so if they are not quite in place."""
     shifts = off * np.random.default_rng(2).normal(size=(2, 6))
     vehicle = HEXA._replace(
         rotor_x=PerRotor.of((np.array([*HEXA.rotor_x]) + shifts[0]).tolist()),

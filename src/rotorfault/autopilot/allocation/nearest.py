@@ -3,10 +3,11 @@ r"""Rotor thrusts within limits whose wrench is nearest to a demand, for any fra
 Of N rotors with thrusts :math:`F_i \in [l_i, h_i]` those are wanted whose wrench BF meets the demand; where none
 does, those that miss least tilt torque, among these least thrust, and among these least yaw torque.
 
-It begins with the thrusts that meet the demand with the least sum of :math:`(F_i - r_i)^2/D_i`, each put within its
-limits; :math:`r_i` is its thrust at rest, 0 or the limit nearest to it, and :math:`D_i` the square of the rotor's
-believed effectiveness. So it is loads, thrusts over what each can give, whose sum of squares is least: one that gives
-little is asked for little, and more than four rotors share the work. Where none was beyond a limit, that is all.
+It begins with the thrusts that meet the demand with the least sum of :math:`(F_i - m_i)^2/D_i`, each put within its
+limits; :math:`m_i` is the middle between its limits, and :math:`D_i` the square of the rotor's believed
+effectiveness. So what is least is the distance from the middle over what a rotor has: rotors keep away from their
+limits, one that gives little is asked for little, and more than four share the work. Where none was beyond a limit,
+that is all.
 
 Else the rotors that are within their limits take over what those at them leave, a few times (redistribution). What is
 then missing of tilt, then of thrust, then of yaw is made up for, each without a change of what comes before it. To
@@ -125,7 +126,7 @@ def nearest(matrix: WrenchRows, demand: Wrench, limits: Limits, steps: Steps | N
     lengths = [sqrt(row.dot(row)) for row in matrix]
     up, roll, pitch, yaw = rows = tuple(row * (1.0 / length) for row, length in zip(matrix, lengths, strict=True))
     wanted = [x / length for x, length in zip((demand.thrust, *demand.torque_B), lengths, strict=True)]
-    thrust = limits.low.map(lambda low, high: clip(0.0, low, high), limits.high)
+    thrust = (limits.low + limits.high) * 0.5
     free = limits.weight
     for _ in range(1 + steps.share):
         y = _solved(rows, free, [d - row.dot(thrust) for d, row in zip(wanted, rows, strict=True)])

@@ -1,12 +1,12 @@
 r"""Sequential desaturation, PX4's allocation of multicopters, for any frame, with its failure modes.
 
 With B the effectiveness of the rotors that are in use and P its pseudo-inverse, each column of P says how the thrusts
-change for one axis alone. Some of the demand is mixed, :math:`F = Pw`; where thrusts are then beyond their limits they
-are moved along the columns, one after another. For a column d the factor is
+change for one axis alone. Some of the demand is mixed, :math:`F = Pw`; where thrusts are then beyond their limits
+they are moved along the columns, one after another. For a column d the factor is
 
 .. math:: k(F, d) = \min_i(0, k_i) + \max_i(0, k_i), \qquad k_i = (\mathrm{clip}(F_i, l_i, h_i) - F_i) / d_i
 
-over the rotors with :math:`|d_i|` of 0.2 and more (in PX4's scale, see `Axes`), and a move is two steps,
+over the rotors with :math:`|d_i|` of 0.2 and more (in PX4's scale, see `weak_parts`), and a move is two steps,
 
 .. math:: F' = F + k(F, d)\,d, \qquad F'' = F' + \tfrac12 k(F', d)\,d .
 
@@ -18,24 +18,26 @@ What is mixed and moved along is the *airmode*:
 ``roll_pitch_yaw``     mix all; move along thrust, up or down; along yaw
 =====================  =====================================================================
 
-*Yaw*: it is added; with each upper limit 15 % of the range higher, move along yaw; then move down along thrust. A move
-down along thrust is not made at all where k would raise thrust. At the end each thrust is put within its limits.
+*Yaw*: it is added; with each upper limit 15 % of the range higher, move along yaw; then move down along thrust. A
+move down along thrust is not made at all where k would raise thrust. At the end each thrust is put within its limits.
 
-*Failure modes*, PX4's CA_FAILURE_MODE 0, 1, 2. PX4 knows no partial loss: a rotor has failed or it has not. Here it has
-failed while it is flagged with a believed loss of `failed_loss` and more, or is believed stuck. One that fails alone is
-handled, and stays so until none has failed; while it is handled a second one is not looked at, nor are two that fail at
-once. ``ignore`` changes nothing. The others take the column of the handled rotor out of B. On frames of six rotors its
-*opposite*, of the rotors that turn the other way the one nearest to the point opposite to it (the first of several),
-is then stopped too, or may be reversed down to :math:`-0.4\,c_{max}` (CA_REV_THR_FRAC); on other frames it is as it was.
+*Failure modes*, PX4's CA_FAILURE_MODE 0, 1, 2. PX4 knows no partial loss: a rotor has failed or it has not. Here it
+has failed while it is flagged with a believed loss of `failed_loss` and more, or is believed stuck. One that fails
+alone is handled, and stays so until none has failed; while it is handled a second one is not looked at, nor are two
+that fail at once. ``ignore`` changes nothing. The others take the column of the handled rotor out of B. On frames of
+six rotors its *opposite*, of the rotors that turn the other way the one nearest to the point opposite to it (the
+first of several), is then stopped too, or may be reversed down to :math:`-0.4\,c_{max}` (CA_REV_THR_FRAC); on other
+frames it is as it was.
 
-Sources, read in November 2026: PX4 documentation of main, "Motor Failure Recovery" and release notes of v1.18 and main;
-PX4-Autopilot pull requests 10962 (the mixing), 27754 (airmode), 28078 (failure modes), 28589 (axes that are dropped);
-the source of ControlAllocationSequentialDesaturation in main for what these leave open. Airmode is that of MC_AIRMODE;
-in main MC_AIRMODE_LIM replaces it, whose default 0 is ``off``. None of PX4's code is used.
+Sources, read in November 2026: PX4 documentation of main, "Motor Failure Recovery" and release notes of v1.18 and
+main; PX4-Autopilot pull requests 10962 (the mixing), 27754 (airmode), 28078 (failure modes), 28589 (axes that are
+dropped); the source of ControlAllocationSequentialDesaturation in main for what these leave open. Airmode is that of
+MC_AIRMODE; in main MC_AIRMODE_LIM replaces it, whose default 0 is ``off``. None of PX4's code is used.
 
-Departures. PX4's outputs are shares of the largest thrust: here they are newtons, so a reversed rotor gives what it is
-commanded, and CA_REV_THR_FRAC is a limit, not a factor. An axis that the rotors in use cannot tell from those before it
-(thrust, roll, pitch, yaw) is dropped where less than `OWN` of its row is its own; PX4's bound is another number.
+Departures. PX4's outputs are shares of the largest thrust: here they are newtons, so a reversed rotor gives what it
+is commanded, and CA_REV_THR_FRAC is a limit, not a factor. An axis that the rotors in use cannot tell from those
+before it (thrust, roll, pitch, yaw) is dropped where less than `OWN` of its row is its own; PX4's bound is another
+number.
 """
 
 from __future__ import annotations
@@ -302,7 +304,8 @@ def _moved(thrust: PerRotor, axis: Axis, low: PerRotor, high: PerRotor, down: bo
     makes = less_equal(first, 0.0) if down else 1.0
     thrust = thrust + axis.along * (select(makes, first, 0.0) if down else first)
     second = 0.5 * _factor(thrust, axis, low, high)
-    return thrust + axis.along * (select(makes, second, 0.0) if down else second)
+    moved: PerRotor = thrust + axis.along * (select(makes, second, 0.0) if down else second)
+    return moved
 
 
 def _factor(thrust: PerRotor, axis: Axis, low: PerRotor, high: PerRotor) -> Scalar:
