@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -98,14 +99,14 @@ def flown(scenario: rf.Scenario, rotor: int, flights: int, seed: int) -> dict[st
     }
 
 
-def told(numbers: dict[str, Array]) -> dict[str, float]:
-    """Counts, the interval, and quantiles of flights that are not lost."""
+def told(numbers: dict[str, Array]) -> dict[str, float | None]:
+    """Counts, the interval, and quantiles of flights that are not lost; None where all are."""
     alive = numbers["survived"].astype(bool)
     lost, count = int((~alive).sum()), len(alive)
     low, high = (float(end) for end in clopper_pearson(lost, count))
 
-    def median(name: str) -> float:
-        return float(np.median(numbers[name][alive])) if alive.any() else math.nan
+    def of_alive(name: str, what: Callable[[Array], Any], unit: float = 1.0) -> float | None:
+        return unit * float(what(numbers[name][alive])) if alive.any() else None
 
     return {
         "flights": count,
@@ -113,10 +114,10 @@ def told(numbers: dict[str, Array]) -> dict[str, float]:
         "lost from": low,
         "lost to": high,
         "found after [ms]": 1e3 * float(np.nanmedian(numbers["found"])),
-        "height lost [m]": median("altitude_lost"),
-        "worst height lost [m]": float(numbers["altitude_lost"][alive].max()) if alive.any() else math.nan,
-        "yaw error [deg]": math.degrees(median("yaw_error")),
-        "yaw rate [rad/s]": median("yaw_rate"),
+        "height lost [m]": of_alive("altitude_lost", np.median),
+        "worst height lost [m]": of_alive("altitude_lost", np.max),
+        "yaw error [deg]": of_alive("yaw_error", np.median, math.degrees(1.0)),
+        "yaw rate [rad/s]": of_alive("yaw_rate", np.median),
     }
 
 
@@ -159,6 +160,10 @@ def study(chosen: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+def number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """The table in words."""
     head = [
@@ -179,9 +184,9 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
             row["allocation"],
             f"{row['lost']} of {row['flights']}",
             f"{100 * row['lost from']:.1f} to {100 * row['lost to']:.1f} %",
-            f"{row['height lost [m]']:.2f}, {row['worst height lost [m]']:.2f}",
-            f"{row['yaw error [deg]']:.0f}",
-            f"{row['yaw rate [rad/s]']:.2f}",
+            f"{number(row['height lost [m]'], 2)}, {number(row['worst height lost [m]'], 2)}",
+            number(row["yaw error [deg]"], 0),
+            number(row["yaw rate [rad/s]"], 2),
             " ".join(str(one["lost"]) for one in row["by rotor"]),
         ]
         for row in rows
