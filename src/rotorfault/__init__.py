@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         critical_thrust_to_weight,
     )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.analysis.null_space import NullSpace, null_space
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
     from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
@@ -96,6 +97,7 @@ _HOME = {
     "InputError": "base.errors",
     "Mat3": "maths.geometry",
     "Nothing": "model.block",
+    "NullSpace": "analysis.null_space",
     "OneRotor": "plant.faults",
     "PerRotor": "maths.geometry",
     "Quantity": "model.telemetry",
@@ -141,6 +143,7 @@ _HOME = {
     "load_scenario": "scenario.library",
     "load_vehicle": "model.vehicle_file",
     "neighbour": "scenario.neighbours",
+    "null_space": "analysis.null_space",
     "register": "model.slot",
     "repeat": "flight.fly",
     "scenario_names": "scenario.library",
@@ -184,6 +187,7 @@ __all__ = [
     "InputError",
     "Mat3",
     "Nothing",
+    "NullSpace",
     "OneRotor",
     "PerRotor",
     "Quantity",
@@ -230,6 +234,7 @@ __all__ = [
     "load_scenario",
     "load_vehicle",
     "neighbour",
+    "null_space",
     "register",
     "repeat",
     "scenario_names",

@@ -145,6 +145,7 @@ BAD = {
     "triangle": (changed("inertia_z = { value = 0.018", "inertia_z = { value = 0.0201"), "inertia_z", "sum.*0.02"),
     "too weak": (changed("thrust_max = { value = 5.5", "thrust_max = { value = 2.4"), "thrust_max", "0.979.*2.45"),
     "limits swapped": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 5.6"), "thrust_min", "less"),
+    "too far back": (changed("thrust_min = { value = 0.0", "thrust_min = { value = -6.0"), "thrust_min", "backwards"),
     "no descent": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 2.46"), "thrust_min", "2.453 N"),
     "unknown key": (changed("mass =", "masss ="), "masss", "unknown key; did you mean 'mass'"),
     "missing key": (re.sub("^gravity = .*", "", GOOD, flags=re.M), "gravity", "missing"),

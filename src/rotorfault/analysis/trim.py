@@ -19,6 +19,7 @@ import numpy as np
 from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
 from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.null_space import null_space_lines
 from rotorfault.analysis.reach import reach_lines
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.autopilot.control import CONTROLLER
@@ -104,7 +105,8 @@ class TrimReport(NamedTuple):
         """Plain text for a terminal of 100 columns."""
         model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
         loop = (model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
-        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), *loop)
+        free = null_space_lines(self.numbers, self.attainable.loss)
+        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), free, *loop)
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 

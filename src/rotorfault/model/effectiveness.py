@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, maximum, sqrt
+from rotorfault.maths.scalar import Scalar, less, maximum, select, sqrt
 from rotorfault.model.signals import Wrench
 from rotorfault.model.tilt import Tilt
 from rotorfault.model.vehicle import Vehicle, drag_arms, rows_of_tilted
@@ -37,6 +37,7 @@ LEAST_PIVOT = 1e-9
 # leaves some thousandths of the lateral force that rotors can take back, and still no matrix that is near singular
 # where they cannot.
 LATERAL = 1e3
+LEAST_LENGTH = 1e-12  # m, or 1: of a row that no rotor in use has anything of
 
 
 class WrenchRows(NamedTuple):
@@ -112,7 +113,7 @@ def eased(thrust: PerRotor, lateral: LateralRows, weight: PerRotor) -> PerRotor:
     return thrust - taken
 
 
-def pseudo_inverse(matrix: WrenchRows, lateral: LateralRows | tuple[()] = ()) -> WrenchRows:
+def pseudo_inverse(matrix: WrenchRows, lateral: LateralRows | tuple[()] = (), own: float = 0.0) -> WrenchRows:
     """Transposed pseudo-inverse: thrust of each rotor for a newton of thrust, or a newton metre about each axis.
 
     Parameters
@@ -121,27 +122,35 @@ def pseudo_inverse(matrix: WrenchRows, lateral: LateralRows | tuple[()] = ()) ->
         The effectiveness, of any scalars.
     lateral : LateralRows, optional
         Of tilted rotors, whose lateral force is to be small.
+    own : float
+        An axis of whose row less than this share is across those before it is left alone: 0 in the inverse, and in
+        that of the others as if it were not there.
     """
 
     def between(row: PerRotor) -> PerRotor:
         return eased(row, lateral, PerRotor.all(1.0, len(row))) if isinstance(lateral, LateralRows) else row
 
     lengths = [sqrt(row.dot(row)) for row in matrix]
+    if own > 0.0:
+        lengths = [maximum(length, LEAST_LENGTH) for length in lengths]
     unit = [row * (1.0 / length) for row, length in zip(matrix, lengths, strict=True)]
     # L D L^T of the Gram matrix: the rows, each less its part along those before.
     across: list[PerRotor] = []
-    pivots: list[Scalar] = []
+    over: list[Scalar] = []
     share: list[list[Scalar]] = []
     for row in unit:
-        along = [row.dot(between(other)) / pivot for other, pivot in zip(across, pivots, strict=True)]
+        along = [row.dot(between(other)) * factor for other, factor in zip(across, over, strict=True)]
         left = row
         for part, other in zip(along, across, strict=True):
             left = left - other * part
         across.append(left)
-        pivots.append(maximum(left.dot(between(left)), LEAST_PIVOT))
+        pivot = left.dot(between(left))
+        over.append(1.0 / maximum(pivot, LEAST_PIVOT))
+        if own > 0.0:
+            over[-1] = select(less(pivot, own * own), 0.0, over[-1])
         share.append(along)
     # Backwards: column k of the inverse is what the row that is left gives, less what it adds to the rows after it.
-    inverse: list[PerRotor] = [across[k] * (1.0 / pivots[k]) for k in range(len(unit))]
+    inverse: list[PerRotor] = [across[k] * over[k] for k in range(len(unit))]
     for k in reversed(range(len(unit))):
         for later in range(k + 1, len(unit)):
             inverse[k] = inverse[k] - inverse[later] * share[later][k]

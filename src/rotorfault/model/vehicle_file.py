@@ -171,6 +171,12 @@ class VehicleFile(Strict):
         if wrong is not None:
             return wrong
         low, high, ratio = min(self.of_rotors("thrust_min")), max(self.of_rotors("thrust_max")), self.thrust_to_weight
+        for least, most in zip(self.of_rotors("thrust_min"), self.of_rotors("thrust_max"), strict=True):
+            if not least >= -most:
+                said = (
+                    f"got {least!r} N; allowed: -thrust_max = {-most!r} N or more, for rotors that can turn backwards"
+                )
+                return refusal("thrust_min", said)
         hover = self.mass.value * self.gravity.value / math.fsum(self.of_rotors("rotor_gain"))
         if not ratio > 1.0:
             message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"

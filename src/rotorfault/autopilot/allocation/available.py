@@ -17,7 +17,7 @@ from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import in_pairs
-from rotorfault.model.motion import effect_of
+from rotorfault.model.motion import effect_of, idle
 from rotorfault.model.signals import Stuck, following
 from rotorfault.model.vehicle import Vehicle
 
@@ -49,7 +49,8 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = Non
     high = effect * vehicle.thrust_max + stuck.thrust
     if vehicle.pairs == ():
         share = effect * per_rotor(lambda gain: 1.0 / gain, vehicle.rotor_gain)
-        limits = limits_of(effect * vehicle.thrust_min + stuck.thrust, high, share)
+        # Rotors that can turn backwards begin at rest: there they are balanced, whatever each has lost.
+        limits = limits_of(effect * idle(vehicle) + stuck.thrust, high, share)
         with_yaw, without_yaw = most_thrust(effectiveness(vehicle), limits, STEPS)
         return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
     most = in_pairs(vehicle, high)
