@@ -20,6 +20,7 @@ from rotorfault.analysis.attainable import Attainable, attainable, attainable_li
 from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
+from rotorfault.analysis.signatures import Signatures, signature_lines, told_apart
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
@@ -77,6 +78,7 @@ class TrimReport(NamedTuple):
     numbers: Vehicle
     hover: Hover
     attainable: Attainable
+    signatures: Signatures | None  # None for opposite pairs, of which a diagnosis sees each rotor by itself
     linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
     margins: dict[str, Margins]  # per axis of `rotorfault.analysis.linearisation.AXES`; empty without linearisation
     warnings: tuple[str, ...]
@@ -102,7 +104,8 @@ class TrimReport(NamedTuple):
         """Plain text for a terminal of 100 columns."""
         model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
         loop = (model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
-        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), *loop)
+        told = [] if self.signatures is None else signature_lines(self.signatures)
+        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), told, *loop)
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
@@ -226,7 +229,9 @@ def trim_report(
     except InputError as error:
         warnings.append(f"no linearisation: {error}")
     possible = attainable(numbers, loss)
-    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, axis_margins, tuple(warnings))
+    told = None if numbers.pairs else told_apart(numbers, period)
+    held = hover(numbers)
+    return TrimReport(label, name, period, numbers, held, possible, told, linear, axis_margins, tuple(warnings))
 
 
 def _shared_out(

@@ -6,7 +6,7 @@ A map of three or four axes is looked at in slices, one for each combination of 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -174,18 +174,23 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
     Returns
     -------
     Edges or None
-        None where that is not known, or an axis of the slice has names instead of numbers.
+        None where that is not known, or no axis of the slice has numbers. Beside names it is a line for each of them.
     """
     flat = maps.views[:2]
-    if not all(view.numeric and len(view.values) > 1 for view in flat) or maps.variants[variant].possible is None:
+    if maps.variants[variant].possible is None or not any(view.numeric and len(view.values) > 1 for view in flat):
         return None
     further = {view.name: view.values[place] for view, place in zip(maps.views[2:], part.at[2:], strict=True)}
 
-    def possible(points: Array) -> Limits | None:
-        values = {view.name: column for view, column in zip(flat, points.T, strict=True)}
-        values |= {name: np.full(len(points), value) for name, value in further.items()}
-        return limits(maps.study, variant, values, middle=True)
+    def told(values: dict[str, NDArray[Any]]) -> Limits | None:
+        count = len(next(iter(values.values())))
+        others = {name: np.full(count, value) for name, value in further.items()}
+        return limits(maps.study, variant, {**values, **others}, middle=True)
 
+    def possible(points: Array) -> Limits | None:
+        return told({view.name: column for view, column in zip(flat, points.T, strict=True)})
+
+    if not all(view.numeric and len(view.values) > 1 for view in flat):
+        return _edges_beside_names(flat, told)
     fine = [np.linspace(view.positions[0], view.positions[-1], FINE) for view in flat]
     grid = np.stack(np.meshgrid(*fine, indexing="ij"), axis=-1)
     if (indicators := possible(grid.reshape(-1, len(flat)))) is None:
@@ -196,6 +201,31 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
         coarse = _steps(fine[0], shaped) if len(flat) == 1 else _contours(fine[0], fine[1], shaped, 0.5)
         lines.append([_refined(line, fine, partial(_indicator, possible, k)) for line in coarse])
     return Edges(lines[0], lines[1])
+
+
+def _edges_beside_names(
+    flat: Sequence[View], told: Callable[[dict[str, NDArray[Any]]], Limits | None]
+) -> Edges | None:
+    """Limits along the one axis that has numbers, as a short line across each cell of the other."""
+    axis = 0 if flat[0].numeric and len(flat[0].values) > 1 else 1
+    view, names = flat[axis], flat[1 - axis]
+    lines: tuple[list[Array], list[Array]] = ([], [])
+    for place, name in zip(names.positions, names.values, strict=True):
+        x = np.linspace(view.positions[0], view.positions[-1], FINE)
+        row = told({view.name: x, names.name: np.full(FINE, name)})
+        if row is None:
+            return None
+        for k, field in enumerate(row):
+            for i in np.flatnonzero(np.diff(field)):
+                inner, outer = x[i], x[i + 1]
+                for _ in range(HALVINGS):
+                    middle = np.array([0.5 * (inner + outer)])
+                    there = told({view.name: middle, names.name: np.full(1, name)})
+                    same = there is not None and there[k][0] == field[i]
+                    inner, outer = (float(middle[0]), outer) if same else (inner, float(middle[0]))
+                across = np.array([[outer, place - 0.5], [outer, place + 0.5]])
+                lines[k].append(across if axis == 0 else across[:, ::-1])
+    return Edges(*lines)
 
 
 def _indicator(possible: Callable[[Array], Limits | None], k: int, points: Array) -> Array:

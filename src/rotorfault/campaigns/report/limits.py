@@ -1,11 +1,15 @@
-"""Where on a map hover is physically possible, whoever controls: `rotorfault.analysis.hover` for each cell.
+"""Where on a map hover can be controlled, whoever does it: `rotorfault.analysis.hover` for each cell.
+
+Controlled means more than possible: at the thrust of hover some torque about each axis is left, either way. That is
+where the control authority index (ACAI) is positive: a convex set of wrenches that reaches a little way from hover
+along each axis has hover inside.
 
 What counts is the true vehicle with its mismatch, the losses that stay and the mean wind; faults and winds are asked
 for them. Gusts, rotor lag and the way from flight before the fault are not looked at: beyond the limit nothing stays
 in place for long, within it a controller may still fail.
 
-What a study draws is looked at by its ends: a cell in which hover is possible at some of them and not at others gets
-no answer. Of a normal draw the ends are three deviations away.
+What a study draws is looked at by its ends: a cell in which it can at some of them and not at others gets no answer.
+Of a normal draw the ends are three deviations away.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.analysis.hover import hover_margin
+from rotorfault.analysis.hover import hover_margin, torque_reserve
 from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.study import Study
@@ -33,10 +37,11 @@ from rotorfault.scenario.scenario import Scenario
 
 MOST_ENDS = 256  # combinations of ends of draws; beyond, there is no answer
 DEVIATIONS = 3.0
+NEGLIGIBLE = 1e-6  # of the largest thrust of a rotor: less in reserve is 0 but for rounding
 
 
 class Limits(NamedTuple):
-    """Whether hover is possible: 1, 0, or NaN where it depends on what is drawn."""
+    """Whether hover can be controlled: 1, 0, or NaN where it depends on what is drawn."""
 
     with_yaw: Array
     without_yaw: Array
@@ -54,7 +59,7 @@ class Physics(NamedTuple):
 
 
 def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, middle: bool = False) -> Limits | None:
-    """Whether hover is possible at some values of a study's axes.
+    """Whether hover can be controlled at some values of a study's axes.
 
     Parameters
     ----------
@@ -86,11 +91,28 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
         physics = _physics(scenario, columns({**values, **drawn, **others}), count)
         if physics is None:
             return None
-        margin = hover_margin(*physics)
-        answers.append([np.broadcast_to(one, (count,)) for one in (margin.with_yaw, margin.without_yaw)])
+        answers.append([np.broadcast_to(one, (count,)) for one in _controlled(physics)])
     possible = np.array(answers, dtype=float)  # (ends, 2, N)
     every, some = possible.min(axis=0), possible.max(axis=0)
     return Limits(*np.where(every == some, every, every if middle else np.nan))
+
+
+def _controlled(physics: Physics) -> tuple[Array, Array]:
+    """1 where hover can be controlled, with yaw held and with yaw given up, else 0."""
+    vehicle, loss, wind_W = physics
+    margin = hover_margin(vehicle, loss, wind_W)
+    found = []
+    for possible, most, yaw in (
+        (margin.with_yaw, margin.thrust_with_yaw, True),
+        (margin.without_yaw, margin.thrust_without_yaw, False),
+    ):
+        reserve = torque_reserve(vehicle, loss, yaw, wind_W)
+        arm = vehicle.rotor_x.dot(vehicle.rotor_x) ** 0.5 + vehicle.rotor_y.dot(vehicle.rotor_y) ** 0.5
+        levers = (arm, arm, vehicle.torque_ratio) if yaw else (arm, arm)
+        unit = NEGLIGIBLE * vehicle.rotor_gain * vehicle.thrust_max
+        left = [torque > unit * lever for torque, lever in zip(reserve, levers, strict=False)]
+        found.append(np.logical_and.reduce([possible > 0.0, most - margin.needed > unit, *left]).astype(float))
+    return found[0], found[1]
 
 
 def _matters(study: Study, scenario: Scenario, draw: Draw) -> bool:
