@@ -40,8 +40,8 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``machine``, ``single``, ``batch`` (by size), ``frames`` (by number of rotors), ``operations``, ``noise``, ``scaling``, ``sdre``, ``latency``,
-        ``accuracy`` (None without heyoka), ``peers`` (empty unless asked for).
+        ``machine``, ``single``, ``batch`` (by size), ``frames`` (by number of rotors), ``operations``, ``noise``,
+        ``scaling``, ``sdre``, ``latency``, ``accuracy`` (None without heyoka), ``peers`` (empty unless asked for).
 
     Raises
     ------
