@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from frame_picture import frame_losses
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -312,6 +313,7 @@ PICTURES: dict[str, Callable[[], Figure | bytes]] = {
     "motors-built-in.png": motors_built_in,
     "motors-autopilots.png": motors_autopilots,
     "frames.png": frames,
+    "frame-losses.png": frame_losses,
     "data-flow.png": data_flow,
     "gallery-rotors.png": plotted("rotors", CASE),
     "gallery-detection.png": plotted("fault_detection", "hover-fault"),

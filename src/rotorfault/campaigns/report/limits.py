@@ -1,8 +1,7 @@
 """Where on a map hover can be controlled, whoever does it: `rotorfault.analysis.hover` for each cell.
 
-Controlled means more than possible: at the thrust of hover some torque about each axis is left, either way. That is
-where the control authority index (ACAI) is positive: a convex set of wrenches that reaches a little way from hover
-along each axis has hover inside.
+Controlled means more than possible: every small change of wrench about hover can be given, so that the control
+authority index (ACAI) is positive.
 
 What counts is the true vehicle with its mismatch, the losses that stay and the mean wind; faults and winds are asked
 for them. Gusts, rotor lag and the way from flight before the fault are not looked at: beyond the limit nothing stays
@@ -21,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.analysis.hover import hover_margin, torque_reserve
+from rotorfault.analysis.hover import hover_controlled
 from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.study import Study
@@ -37,7 +36,6 @@ from rotorfault.scenario.scenario import Scenario
 
 MOST_ENDS = 256  # combinations of ends of draws; beyond, there is no answer
 DEVIATIONS = 3.0
-NEGLIGIBLE = 1e-6  # of the largest thrust of a rotor: less in reserve is 0 but for rounding
 
 
 class Limits(NamedTuple):
@@ -91,28 +89,10 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
         physics = _physics(scenario, columns({**values, **drawn, **others}), count)
         if physics is None:
             return None
-        answers.append([np.broadcast_to(one, (count,)) for one in _controlled(physics)])
+        answers.append([np.broadcast_to(one, (count,)) for one in hover_controlled(*physics)])
     possible = np.array(answers, dtype=float)  # (ends, 2, N)
     every, some = possible.min(axis=0), possible.max(axis=0)
     return Limits(*np.where(every == some, every, every if middle else np.nan))
-
-
-def _controlled(physics: Physics) -> tuple[Array, Array]:
-    """1 where hover can be controlled, with yaw held and with yaw given up, else 0."""
-    vehicle, loss, wind_W = physics
-    margin = hover_margin(vehicle, loss, wind_W)
-    found = []
-    for possible, most, yaw in (
-        (margin.with_yaw, margin.thrust_with_yaw, True),
-        (margin.without_yaw, margin.thrust_without_yaw, False),
-    ):
-        reserve = torque_reserve(vehicle, loss, yaw, wind_W)
-        arm = vehicle.rotor_x.dot(vehicle.rotor_x) ** 0.5 + vehicle.rotor_y.dot(vehicle.rotor_y) ** 0.5
-        levers = (arm, arm, vehicle.torque_ratio) if yaw else (arm, arm)
-        unit = NEGLIGIBLE * vehicle.rotor_gain * vehicle.thrust_max
-        left = [torque > unit * lever for torque, lever in zip(reserve, levers, strict=False)]
-        found.append(np.logical_and.reduce([possible > 0.0, most - margin.needed > unit, *left]).astype(float))
-    return found[0], found[1]
 
 
 def _matters(study: Study, scenario: Scenario, draw: Draw) -> bool:
