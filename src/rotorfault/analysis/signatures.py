@@ -126,7 +126,8 @@ def _signatures(vehicle: Vehicle) -> Array:
     """Angular acceleration in rad/s^2 by the loss of a newton of each rotor, shape (3, rotors)."""
     rows = effectiveness(vehicle)
     inertia = np.array([*vehicle.inertia], dtype=float)
-    return -np.array([[*row] for row in (rows.roll, rows.pitch, rows.yaw)], dtype=float) / inertia[:, None]
+    torques = np.array([[*row] for row in (rows.roll, rows.pitch, rows.yaw)], dtype=float)
+    return np.asarray(-torques / inertia[:, None])
 
 
 def _pairs(own: Array) -> list[ToldPair]:

@@ -15,8 +15,8 @@ no fault: `noise` standard deviations of noise, and what a wrong model explains,
 
   .. math:: f_i = \frac{G_{jj}m_i - G_{ij}m_j}{G_{ii}G_{jj} - G_{ij}^2}, \qquad \Delta_{ij} = f_im_i + f_jm_j .
 
-  The pair with the most is suspected if it has more than any other by 1. If no pair has, several explain it alike, and
-  nobody is suspected; but one rotor is that explains `NEARLY` all of it, for then the rest may be what no rotor does.
+  The pair with the most is suspected if it has more than any other by 1. If no pair has, several explain it alike,
+  and nobody is suspected; but one rotor is that explains `NEARLY` all of it, for the rest may be what no rotor does.
 
 So losses are found one after another, or two at once, the sparsest explanation first. Thrust itself is not looked at:
 a vertical wind, a wrong mass, or a battery that is running down shows in it alone, and is nobody's fault.

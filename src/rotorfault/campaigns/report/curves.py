@@ -209,23 +209,29 @@ def _edges_beside_names(
     """Limits along the one axis that has numbers, as a short line across each cell of the other."""
     axis = 0 if flat[0].numeric and len(flat[0].values) > 1 else 1
     view, names = flat[axis], flat[1 - axis]
-    lines: tuple[list[Array], list[Array]] = ([], [])
-    for place, name in zip(names.positions, names.values, strict=True):
-        x = np.linspace(view.positions[0], view.positions[-1], FINE)
-        row = told({view.name: x, names.name: np.full(FINE, name)})
-        if row is None:
-            return None
-        for k, field in enumerate(row):
-            for i in np.flatnonzero(np.diff(field)):
-                inner, outer = x[i], x[i + 1]
-                for _ in range(HALVINGS):
-                    middle = np.array([0.5 * (inner + outer)])
-                    there = told({view.name: middle, names.name: np.full(1, name)})
-                    same = there is not None and there[k][0] == field[i]
-                    inner, outer = (float(middle[0]), outer) if same else (inner, float(middle[0]))
-                across = np.array([[outer, place - 0.5], [outer, place + 0.5]])
-                lines[k].append(across if axis == 0 else across[:, ::-1])
-    return Edges(*lines)
+    named = np.array(names.values)
+
+    def at(x: Array, row: NDArray[np.intp]) -> Limits | None:
+        return told({view.name: x, names.name: named[row]})
+
+    x = np.linspace(view.positions[0], view.positions[-1], FINE)
+    rows = np.arange(len(named))
+    if (indicators := at(np.tile(x, len(named)), np.repeat(rows, FINE))) is None:
+        return None
+    lines: list[list[Array]] = []
+    for k, field in enumerate(indicators):
+        shaped = field.reshape(len(named), FINE)
+        row, place = np.nonzero(np.diff(shaped, axis=1))
+        inner, outer, inside = x[place], x[place + 1], shaped[row, place]
+        for _ in range(HALVINGS if len(row) else 0):
+            middle = 0.5 * (inner + outer)
+            there = at(middle, row)
+            assert there is not None  # as it was for the whole grid
+            same = there[k] == inside
+            inner, outer = np.where(same, middle, inner), np.where(same, outer, middle)
+        ends = [np.array([[e, p - 0.5], [e, p + 0.5]]) for e, p in zip(outer, names.positions[row], strict=True)]
+        lines.append([line if axis == 0 else line[:, ::-1] for line in ends])
+    return Edges(lines[0], lines[1])
 
 
 def _indicator(possible: Callable[[Array], Limits | None], k: int, points: Array) -> Array:
