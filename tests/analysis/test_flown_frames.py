@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -39,9 +40,7 @@ def test_vehicles_have_the_motors_of_their_frames() -> None:
     for vehicle, frame in {(one.vehicle, one.frame) for one in CELLS}:
         flown, named = rf.load_vehicle(vehicle).vehicle, rf.load_frame(frame)
         arm = max(np.hypot(flown.rotor_x[k], flown.rotor_y[k]) for k in range(flown.rotors))
-        for motor, x, y, sign in zip(
-            named.motors, flown.rotor_x, flown.rotor_y, flown.rotor_yaw_sign, strict=True
-        ):
+        for motor, x, y, sign in zip(named.motors, flown.rotor_x, flown.rotor_y, flown.rotor_yaw_sign, strict=True):
             assert (x / arm, y / arm, sign) == pytest.approx((motor.x, motor.y, motor.yaw_sign), abs=1e-3)
 
 
@@ -71,16 +70,14 @@ def test_a_lost_motor_is_survived_where_the_index_is_positive_or_it_is_said_why_
 def test_the_diagnosis_is_right_from_about_the_loss_that_is_predicted() -> None:
     for vehicle in dict.fromkeys(one.vehicle for one in flown_signatures()):
         rows = [one for one in flown_signatures() if one.vehicle == vehicle]
-        right = min(
-            one.loss for k, one in enumerate(rows) if all(later.right >= 99 for later in rows[k:])
-        )
+        right = min(one.loss for k, one in enumerate(rows) if all(later.right >= 99 for later in rows[k:]))
         assert 0.5 * rows[0].predicted_least_loss < right < 1.7 * rows[0].predicted_least_loss
 
 
-def test_frames_shows_them_for_single_motors(tmp_path) -> None:  # type: ignore[no-untyped-def]
+def test_frames_shows_them_for_single_motors(tmp_path: Path) -> None:
     done = run("frames", "y6b", "octa-plus", "--json", str(tmp_path / "cases.json"))
     assert done.returncode == 0
-    assert "\n".join(flown_lines("y6b", [(1,), (2,)])[:4]) in done.stdout
+    assert "\n".join(flown_lines("y6b", [(1,), (2,)])[:5]) in done.stdout
     rows = json.loads((tmp_path / "cases.json").read_text())
     for row in rows:
         single = row["frame"] == "y6b" and len(row["failed"]) == 1

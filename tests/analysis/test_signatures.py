@@ -14,6 +14,8 @@ from rotorfault.autopilot.diagnosis.signature import explained
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.effectiveness import effectiveness
 
+# Of 2 s there are 144 looks of 1/120 + 1/180 s, of which one in 31 is better by 1.86 deviations: x^2 + 2 x 1.86/5.5 = 1.
+SHARE = 0.718
 FRAMES = ("du-pnpnpn", "du-ppnnpn", "f550", "y6", "octa-x", "x8")
 
 
@@ -52,8 +54,10 @@ def test_the_least_loss_is_where_the_diagnosis_itself_begins_to_name_the_rotor(n
             behind = [-r for r in seen.residual]
             return behind[rotor - 1] >= decision.threshold * hover * (1.0 - 1e-9) and sum(map(bool, behind)) == 1
 
-        assert named(1.01 * one.least_loss)
-        assert not named(0.99 * one.least_loss)
+        # Noise helps a rotor that is told apart by little over the edge; the threshold it has to pass all the same.
+        edge = one.least_loss / (SHARE if one.least_loss > decision.threshold else 1.0)
+        assert named(1.01 * edge)
+        assert not named(0.99 * edge)
 
 
 def test_more_noise_asks_for_more_loss_where_rotors_are_coaxial() -> None:

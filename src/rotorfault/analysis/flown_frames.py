@@ -153,8 +153,9 @@ def flown_lines(frame: str, sets: Iterable[tuple[int, ...]]) -> list[str]:
     vehicle = next(one.vehicle for _, cells in found for one in cells)
     heading = ("motor", "controller", "ACAI [N], yaw held", "flown so", "given up", "flown so")
     return [
-        f"Flown without the motor: vehicle {vehicle}, thrust to weight {about['thrust_to_weight']:g}, preset "
-        f"{about['preset']}, the fault to be found (version {about['version']}, seed {about['seed']}):",
+        f"Flown without the motor, which has to be found: vehicle {vehicle}, thrust to weight "
+        f"{about['thrust_to_weight']:g}, preset {about['preset']}",
+        f"(version {about['version']}, '{about['command']}', seed {about['seed']}):",
         *table_lines([heading, *rows], "<<>>>>", rule=True),
     ]
 

@@ -11,9 +11,11 @@ model explains nothing,
 .. math:: f\,|g_i| \sin\theta > n\,\sigma,
 
 with the angle :math:`\theta` to the most similar signature, a right angle where that is larger; and where
-:math:`f > \max(threshold\,F, n\,\sigma/|g_i|)`. While the flight lasts the noise has many chances to be on the right
-side for as long as ``decision.persistence`` asks, so the loss at which these hold in the mean is the one at which the
-diagnosis is right 99 times in 100; below it nobody is blamed, rather than the wrong one.
+:math:`f > threshold\,F`. Below it nobody is blamed, rather than the wrong one. While the flight lasts the noise has many
+chances to help: with :math:`f\,|g_i|\sin\theta = x\,n\,\sigma` the difference of the evidence has the mean
+:math:`x^2` and the standard deviation :math:`2x/n`, and of the looks of `TIME`, each as long as the noise of the
+observer stays alike, one exceeds 1 in 99 flights of 100 if :math:`x^2 + 2xz/n = 1`, with z exceeded by a normal number
+in :math:`1 - 0.01^{1/looks}` of all cases.
 
 Two losses at once are looked for after one another. Where a pair of equal losses looks like one of another rotor, or
 like another pair, torque alone cannot say which it is: the angle to the nearest such explanation is 0.
@@ -27,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.special import ndtri
 
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger, LuenbergerSettings
 from rotorfault.autopilot.diagnosis.model_error import noise_energies
@@ -39,6 +42,8 @@ from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.plant.sensors import Noisy
 
+TIME = 2.0  # s within which a rotor is to be named
+SURE = 0.99  # share of flights in which it is
 ALIKE = math.radians(1.0)  # our choice: nearer than this no sensor tells two explanations apart
 
 
@@ -113,13 +118,29 @@ def told_apart(vehicle: Vehicle, period: float = 0.001, rate_noise: float | None
     lengths, angles = np.linalg.norm(own, axis=0), signature_angles(vehicle)
     np.fill_diagonal(angles, np.inf)
     hover = float(hover_thrust(vehicle).sum()) / vehicle.rotors
+    share = _helped_by_noise(decision.noise, sum(1.0 / pole for pole in settings.poles))
     singles = []
     for i, length in enumerate(lengths):
         like, noise = int(np.argmin(angles[i])), sigma / float(length)
         angle = float(angles[i, like])
         apart = decision.noise * noise / math.sin(min(angle, 0.5 * math.pi)) if angle > 0.0 else math.inf
+        apart *= share
         singles.append(Told(i + 1, like + 1, angle, noise, max(decision.threshold, apart / hover)))
     return Signatures(tuple(singles), tuple(_pairs(own)), sigma_rate)
+
+
+def _helped_by_noise(deviations: float, alike: float) -> float:
+    """Share x of the missing thrust at which two rotors are told apart in the mean, at which one look suffices.
+
+    Parameters
+    ----------
+    deviations : float
+        Standard deviations of noise by which one explanation must be better.
+    alike : float, s
+        For which the noise of the observer stays alike.
+    """
+    half = float(ndtri((1.0 - SURE) ** (alike / TIME))) / deviations
+    return math.sqrt(half * half + 1.0) - half
 
 
 def _signatures(vehicle: Vehicle) -> Array:
