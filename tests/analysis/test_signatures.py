@@ -14,7 +14,8 @@ from rotorfault.autopilot.diagnosis.signature import explained
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.effectiveness import effectiveness
 
-# Of 2 s there are 144 looks of 1/120 + 1/180 s, of which one in 31 is better by 1.86 deviations: x^2 + 2 x 1.86/5.5 = 1.
+# In 2 s there are 144 looks of 1/120 + 1/180 s, of which one in 32 is better by 1.86 deviations:
+# x^2 + 2 x 1.86 / 5.5 = 1.
 SHARE = 0.718
 FRAMES = ("du-pnpnpn", "du-ppnnpn", "f550", "y6", "octa-x", "x8")
 

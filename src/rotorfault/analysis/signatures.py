@@ -11,11 +11,11 @@ model explains nothing,
 .. math:: f\,|g_i| \sin\theta > n\,\sigma,
 
 with the angle :math:`\theta` to the most similar signature, a right angle where that is larger; and where
-:math:`f > threshold\,F`. Below it nobody is blamed, rather than the wrong one. While the flight lasts the noise has many
-chances to help: with :math:`f\,|g_i|\sin\theta = x\,n\,\sigma` the difference of the evidence has the mean
+:math:`f > threshold\,F`. Below it nobody is blamed, rather than the wrong one. While the flight lasts the noise has
+many chances to help: with :math:`f\,|g_i|\sin\theta = x\,n\,\sigma` the difference of the evidence has the mean
 :math:`x^2` and the standard deviation :math:`2x/n`, and of the looks of `TIME`, each as long as the noise of the
-observer stays alike, one exceeds 1 in 99 flights of 100 if :math:`x^2 + 2xz/n = 1`, with z exceeded by a normal number
-in :math:`1 - 0.01^{1/looks}` of all cases.
+observer stays alike, one exceeds 1 in 99 flights of 100 if :math:`x^2 + 2xz/n = 1`, with z what a normal number
+exceeds in :math:`1 - 0.01^{1/looks}` of all cases.
 
 Two losses at once are looked for after one another. Where a pair of equal losses looks like one of another rotor, or
 like another pair, torque alone cannot say which it is: the angle to the nearest such explanation is 0.
