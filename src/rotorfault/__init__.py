@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
     from rotorfault.analysis.null_space import NullSpace, null_space
+    from rotorfault.analysis.signatures import told_apart
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
     from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
@@ -148,6 +149,7 @@ _HOME = {
     "repeat": "flight.fly",
     "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
+    "told_apart": "analysis.signatures",
     "trim_report": "analysis.trim",
     "tune": "tuning.search",
     "vehicle_names": "model.vehicle_file",
@@ -238,6 +240,7 @@ __all__ = [
     "register",
     "repeat",
     "scenario_names",
+    "told_apart",
     "torque_reserve",
     "trim_report",
     "tune",

@@ -164,6 +164,21 @@ def _any_margin(vehicle: Vehicle, ranges: tuple[PerRotor, PerRotor], needed: Sca
     )
 
 
+def hover_controlled(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -> tuple[Scalar, Scalar]:
+    """Whether hover can be controlled, not only held: 1 or 0 with yaw held, and with yaw given up.
+
+    It can where the control authority index is positive (`rotorfault.analysis.controllability`).
+
+    Parameters
+    ----------
+    vehicle, loss, wind_W
+        As for `hover_margin`.
+    """
+    needed, upright = _needed(vehicle, wind_W)
+    frame = any_frame.frame_of(vehicle, *_thrust_ranges(vehicle, loss), needed)
+    return both(upright, any_frame.controlled(frame, 4)), both(upright, any_frame.controlled(frame, 3))
+
+
 def critical_loss(
     vehicle: Vehicle, rotor: int, yaw: bool = True, wind_W: Vec3 | None = None, loss: PerRotor | None = None
 ) -> Scalar:

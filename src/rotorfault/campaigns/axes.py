@@ -18,6 +18,8 @@ from rotorfault.plant.sensors import Noisy
 from rotorfault.scenario.preset_file import is_preset_file
 
 Columns = dict[str, NDArray[Any]]
+ROTOR_AXES = ("rotor", "second_rotor")
+"""Axes whose numbers are names of rotors: nothing lies between two of them."""
 
 
 class Axis(NamedTuple):

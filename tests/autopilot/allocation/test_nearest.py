@@ -17,7 +17,7 @@ from rotorfault.autopilot.allocation.available import thrust_available
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.effectiveness import WrenchRows, effectiveness, pseudo_inverse
 from rotorfault.model.signals import Wrench, healthy
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Reversible, Vehicle, wrench_of
 
 CASES = 420  # of benchmarks/allocation_study.py, with another seed
 
@@ -124,14 +124,14 @@ def test_an_axis_that_is_hardly_its_own_is_left_out_of_the_inverse() -> None:
     B = np.array([[1.0, 1.0, 1.0, 1.0, 1.0], [1.0, -1.0, 0.5, -0.5, 0.0], [0.3, 0.4, -1.0, -0.2, 0.5], [0.0] * 5])
     B[3] = B[2] + 0.01 * np.array([1.0, -1.0, 1.0, 1.0, -1.0])
     rows = WrenchRows(*(PerRotor.of(row.tolist()) for row in B))
-    got = np.array([[*row] for row in pseudo_inverse(rows, 0.05)])
+    got = np.array([[*row] for row in pseudo_inverse(rows, own=0.05)])
     np.testing.assert_allclose(got[:3], np.linalg.pinv(B[:3]).T, atol=1e-12)
     assert not got[3].any()
     assert np.abs([[*row] for row in pseudo_inverse(rows)]).max() > 10.0
 
 
 def test_rotors_that_turn_backwards_do_so_where_it_is_needed_and_rest_where_dead() -> None:
-    vehicle = hexarotor()._replace(thrust_min=-1.0)
+    vehicle = hexarotor()._replace(thrust_min=-1.0, reversible=Reversible())
     dead = healthy(6)._replace(loss=PerRotor(1.0, *(0.0,) * 5), flagged=PerRotor(1.0, *(0.0,) * 5))
     demand = Wrench(vehicle.mass * vehicle.gravity, Vec3(0.0, 0.0, 0.02))
     found = allocate("effectiveness", vehicle, demand, dead)

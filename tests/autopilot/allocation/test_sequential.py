@@ -19,12 +19,12 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.block import Context
 from rotorfault.model.mixer import nominal_inverse
 from rotorfault.model.signals import Diagnosis, Wrench, healthy
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Reversible, Vehicle, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import load_scenario
 
 HEXA = load_vehicle("du-pnpnpn").vehicle
-REVERSIBLE = HEXA._replace(thrust_min=-0.4 * HEXA.thrust_max)
+REVERSIBLE = HEXA._replace(thrust_min=-0.4 * HEXA.thrust_max, reversible=Reversible())
 WEIGHT = HEXA.mass * HEXA.gravity
 LEVEL = Wrench(WEIGHT, Vec3(0.0, 0.0, 0.0))
 # A quadrotor on which a newton is a share of the largest thrust, as PX4 counts: front and rear, right and left.

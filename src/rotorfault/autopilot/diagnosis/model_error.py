@@ -79,7 +79,6 @@ class ModelErrorMemory(NamedTuple):
     noise: Vec3  # rad^2/s^2: mean square of the innovations of the body rates
 
 
-@lru_cache(maxsize=64)
 def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
     """Standard deviation of a channel's deviation over that of its innovation, in 1/s.
 
@@ -89,6 +88,21 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
         Of the observer.
     period : float, s
         Of sampling; what is measured has white noise.
+    """
+    innovations, deviations = noise_energies(gain_rate, gain_deviation, period)
+    return math.sqrt(deviations / innovations)
+
+
+@lru_cache(maxsize=64)
+def noise_energies(gain_rate: float, gain_deviation: float, period: float) -> tuple[float, float]:
+    """Variances of a channel's innovation, and of its deviation in 1/s^2, over that of white noise measured.
+
+    Parameters
+    ----------
+    gain_rate, gain_deviation : float
+        Of the observer.
+    period : float, s
+        Of sampling.
     """
     # Responses to a single error of measurement, until nothing of it is left.
     rate = deviation = innovations = deviations = 0.0
@@ -100,7 +114,7 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
         deviations += deviation * deviation
         if k > 10 and abs(innovation) < 1e-9 and abs(deviation) < 1e-9 * gain_deviation:
             break
-    return math.sqrt(deviations / innovations)
+    return innovations, deviations
 
 
 def nothing_shown(rotors: int = 4) -> ModelErrorMemory:

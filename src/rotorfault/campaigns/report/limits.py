@@ -1,11 +1,14 @@
-"""Where on a map hover is physically possible, whoever controls: `rotorfault.analysis.hover` for each cell.
+"""Where on a map hover can be controlled, whoever does it: `rotorfault.analysis.hover` for each cell.
+
+Controlled means more than possible: every small change of wrench about hover can be given, so that the control
+authority index (ACAI) is positive.
 
 What counts is the true vehicle with its mismatch, the losses that stay and the mean wind; faults and winds are asked
 for them. Gusts, rotor lag and the way from flight before the fault are not looked at: beyond the limit nothing stays
 in place for long, within it a controller may still fail.
 
-What a study draws is looked at by its ends: a cell in which hover is possible at some of them and not at others gets
-no answer. Of a normal draw the ends are three deviations away.
+What a study draws is looked at by its ends: a cell in which it can at some of them and not at others gets no answer.
+Of a normal draw the ends are three deviations away.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.analysis.hover import hover_margin
+from rotorfault.analysis.hover import hover_controlled
 from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.study import Study
@@ -37,7 +40,7 @@ DEVIATIONS = 3.0
 
 
 class Limits(NamedTuple):
-    """Whether hover is possible: 1, 0, or NaN where it depends on what is drawn."""
+    """Whether hover can be controlled: 1, 0, or NaN where it depends on what is drawn."""
 
     with_yaw: Array
     without_yaw: Array
@@ -55,7 +58,7 @@ class Physics(NamedTuple):
 
 
 def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, middle: bool = False) -> Limits | None:
-    """Whether hover is possible at some values of a study's axes.
+    """Whether hover can be controlled at some values of a study's axes.
 
     Parameters
     ----------
@@ -87,8 +90,7 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
         physics = _physics(scenario, columns({**values, **drawn, **others}), count)
         if physics is None:
             return None
-        margin = hover_margin(*physics)
-        answers.append([np.broadcast_to(one, (count,)) for one in (margin.with_yaw, margin.without_yaw)])
+        answers.append([np.broadcast_to(one, (count,)) for one in hover_controlled(*physics)])
     possible = np.array(answers, dtype=float)  # (ends, 2, N)
     every, some = possible.min(axis=0), possible.max(axis=0)
     return Limits(*np.where(every == some, every, every if middle else np.nan))

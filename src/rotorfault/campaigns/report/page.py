@@ -110,7 +110,7 @@ def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, A
 
 
 def _possible(variant: VariantMap) -> tuple[str, str]:
-    """In how many cells hover is possible, with yaw held and with yaw given up."""
+    """In how many cells hover can be controlled, with yaw held and with yaw given up."""
     if variant.possible is None:
         return "not known", "not known"
     held, free = (_cells(each) for each in variant.possible)
@@ -118,6 +118,6 @@ def _possible(variant: VariantMap) -> tuple[str, str]:
 
 
 def _cells(possible: Array) -> str:
-    """In how many cells hover is possible."""
+    """In how many cells hover can be controlled."""
     depends = int(np.isnan(possible).sum())
     return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")
