@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.motion import angular_acceleration, drag_acceleration
+from rotorfault.model.motion import angular_acceleration, drag_acceleration, torque_of_turning
 from rotorfault.model.signals import Motion, Stuck, following
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
 
@@ -62,7 +62,8 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
         + drag_acceleration(vehicle, -v_W)
         + e.direct_acceleration_W
     )
-    turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
+    torque_B = wrench.torque_B if vehicle.air == () else wrench.torque_B + torque_of_turning(vehicle, omega_B, e.speed)
+    turn = angular_acceleration(vehicle, torque_B, omega_B, e.residual_speed)
     return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle, stuck.rotor))
 
 

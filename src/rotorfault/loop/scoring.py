@@ -163,7 +163,7 @@ class Scoring:
         numbers = _is_finite(signals, new)
         gentle, touched, rest = 1.0, 0.0, 0.0
         # Written as "not inside", so that NaN counts as outside.
-        upright = greater(cosine, 0.0)
+        upright = greater(cosine, -2.0)
         standing: Scalar = 1.0
         if self.ground:
             stage = signals.landing_stage if self.lands else 0.0

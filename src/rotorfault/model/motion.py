@@ -9,8 +9,9 @@ The paper gives no force law for its wind of fixed velocity; linear drag is the 
 
 from __future__ import annotations
 
-from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, clip, exp
+from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.signals import Stuck
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque
 
@@ -43,6 +44,23 @@ def torque_of_motion(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) ->
     """
     spin = omega_B.cross(vehicle.inertia.times(omega_B))
     return gyroscopic_torque(vehicle, omega_B, residual_speed) - spin
+
+
+def torque_of_turning(vehicle: Vehicle, omega_B: Vec3, speeds: PerRotor) -> Vec3:
+    """What the air does against the turning of a body that goes nowhere, in N m; 0 where a vehicle has no air.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    omega_B : Vec3, rad/s
+        Body rates.
+    speeds : PerRotor, rad/s
+        Of the rotors.
+    """
+    if vehicle.air == ():
+        return zeros()
+    assert isinstance(vehicle.air, Aerodynamics)
+    return air_wrench(vehicle.air, vehicle.rotor_x, vehicle.rotor_y, speeds, zeros(), omega_B)[1]
 
 
 def angular_acceleration(vehicle: Vehicle, torque_B: Vec3, omega_B: Vec3, residual_speed: Scalar) -> Vec3:

@@ -37,16 +37,19 @@ from rotorfault.autopilot.control.protocol import (
     SlidingSignals,
     TrackingError,
 )
+from rotorfault.autopilot.control.relaxed import Leaning, lean, leaning_quat, turn_to, upright
 from rotorfault.autopilot.control.sdre import gyroscopic_drift
+from rotorfault.autopilot.control.spectral import Complex, SpinProblem, gain, improve
+from rotorfault.autopilot.control.spectral import start as spin_start
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
 from rotorfault.model.block import Context, Record
-from rotorfault.model.motion import drag_acceleration
+from rotorfault.model.motion import drag_acceleration, torque_of_motion
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Vehicle, rotor_momentum, wrench_of
 
 
 class CascadeSettings(Strict):
@@ -82,6 +85,10 @@ class CascadeSettings(Strict):
         default="so3",
         description="so3: thrust axis and heading as rotations | euler: Euler rates taken for body rates, as in (3)",
     )
+    relaxed: bool = Field(default=False, description="where yaw cannot be held, hover about an axis that leans")
+    push: float = Field(default=0.3, ge=0.0, le=1.0, description="share")
+    lean_max: float = Field(default=0.35, gt=0.0, lt=1.5, description="[rad]")
+    axis_time: float = Field(default=0.5, gt=0.0, description="[s]")
     six_inputs: bool = Field(default=False, description="x and y accelerations act directly: unphysical, for study")
 
 
@@ -95,6 +102,7 @@ class CascadeParameters(NamedTuple):
     cos_min: Scalar
     filter_bandwidth: Scalar  # rad/s
     horizontal_lag: Scalar  # rad/s
+    leaning: Any
 
 
 class CascadeMemory(NamedTuple):
@@ -103,6 +111,7 @@ class CascadeMemory(NamedTuple):
     position: Any
     attitude: Any
     reference: AttitudeReference
+    axis: Any
 
 
 def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
@@ -128,6 +137,15 @@ class CascadeSignals(NamedTuple):
     gain_velocity: Annotated[Vec3, Q("1/s", W, "gain on the velocity error")]
     gain_angle: Annotated[Mat3, Q("1/s^2", RPY, "gain matrix on the attitude error")]
     gain_rate: Annotated[Mat3, Q("1/s", RPY, "gain matrix on the rate error")]
+
+
+def _first(parameters, vehicle):
+    w = parameters.law.sdre if hasattr(parameters.law, "sdre") else parameters.law
+    problem = SpinProblem(0.0, 0.0, vehicle.rotor_bandwidth, w.attitude_q_angle.x / w.attitude_r.x, w.attitude_q_rate.x / w.attitude_r.x)
+    p = spin_start(problem)
+    for _ in range(14):
+        p = improve(problem, p)
+    return p
 
 
 class Cascade(Controller[CascadeMemory, CascadeParameters]):
@@ -159,6 +177,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             s.cos_min,
             s.filter_bandwidth,
             s.horizontal_lag,
+            Leaning(s.push, math.tan(s.lean_max), s.axis_time) if s.relaxed else (),
         )
 
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
@@ -171,7 +190,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         # Only its rate matters: surfaces begin there.
         attitude = _attitude_error(level, estimate.omega_B, level, level, nothing, Mat3.diagonal(level), level)
         law = self.law.initial(position, attitude, parameters.law)
-        return CascadeMemory(law.position, law.attitude, start)
+        return CascadeMemory(law.position, law.attitude, start, (upright(), _first(parameters, inputs.vehicle)) if self.settings.relaxed else ())
 
     def step(
         self, memory: CascadeMemory, inputs: ControlInputs, parameters: CascadeParameters, dt: Scalar
@@ -197,9 +216,29 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         else:
             axis_W, direct = force_W, zeros()
             given = outer.u + force_W - wanted
-        turn = self.tracking.track(
-            memory.reference, estimate, R_WB, axis_W, reference, parameters.filter_bandwidth, dt
-        )
+        axis = memory.axis
+        if self.settings.relaxed:
+            axis, axis_poles = axis
+            axis = lean(axis, vehicle, believed, inputs.thrust_with_yaw, estimate.omega_B.z, inputs.residual_speed, parameters.leaning, dt)
+            to_B = turn_to(axis)
+            seen = estimate._replace(q_WB=estimate.q_WB @ leaning_quat(axis), omega_B=to_B.T @ estimate.omega_B)
+            turn = self.tracking.track(
+                memory.reference, seen, R_WB @ to_B, axis_W, reference, parameters.filter_bandwidth, dt
+            )
+            plain_rate = Vec3(turn.rate.x, turn.rate.y, 0.0)
+            free = turn.acceleration + seen.omega_B.cross(turn.rate)
+            plain_acceleration = Vec3(free.x, free.y, 0.0)
+            held = 1.0 - axis.given_up
+            rate_z = seen.omega_B.z + (turn.rate.z - seen.omega_B.z) * held
+            turn = turn._replace(
+                e=to_B @ Vec3(turn.e.x, turn.e.y, turn.e.z * held),
+                rate=to_B @ Vec3(turn.rate.x, turn.rate.y, rate_z),
+                acceleration=to_B @ Vec3(turn.acceleration.x, turn.acceleration.y, turn.acceleration.z * held),
+            )
+        else:
+            turn = self.tracking.track(
+                memory.reference, estimate, R_WB, axis_W, reference, parameters.filter_bandwidth, dt
+            )
 
         # Attitude loop: torque.
         attitude = _attitude_error(
@@ -212,13 +251,38 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
+        inner_nominal = -(inner.gain_e @ attitude.e) - inner.gain_rate @ attitude.e_dot
+        given_B = wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B
         torque_B = self.tracking.ahead_of_lag(
             (inner.u + attitude.feed_forward).times(vehicle.inertia),
-            wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B,
+            given_B,
             estimate.omega_B,
             w0,
         )
 
+        if self.settings.relaxed:
+            w = parameters.law.sdre if hasattr(parameters.law, "sdre") else parameters.law
+            spin = seen.omega_B.z
+            J = vehicle.inertia
+            Jt = 0.5 * (J.x + J.y)
+            problem = SpinProblem(
+                spin, (J.z * spin + rotor_momentum(vehicle, inputs.residual_speed)) / Jt, w0,
+                w.attitude_q_angle.x / w.attitude_r.x, w.attitude_q_rate.x / w.attitude_r.x,
+            )
+            poles = improve(problem, axis_poles)
+            K = gain(problem, poles)
+            ahead = plain_acceleration - Vec3(0.0, 0.0, spin).cross(plain_rate)
+            target = plain_rate + Vec3(0.0, 0.0, spin)
+            omega_ref = to_B @ target
+            balance = (to_B @ ahead).times(J) - torque_of_motion(vehicle, omega_ref, inputs.residual_speed)
+            lacking = to_B.T @ (given_B - balance).over(J)
+            e_, w_, a_ = to_B.T @ turn.e, seen.omega_B - target, lacking
+            x = K.angle.times(Complex(e_.x, e_.y)), K.rate.times(Complex(w_.x, w_.y)), K.torque.times(Complex(a_.x, a_.y))
+            u_ = to_B @ Vec3(-(x[0].re + x[1].re + x[2].re), -(x[0].im + x[1].im + x[2].im), 0.0)
+            relaxed_B = balance + (u_ + inner.u - inner_nominal).times(J)
+            torque_B = torque_B + (relaxed_B - torque_B) * axis.given_up
+        else:
+            poles = ()
         thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
         own = CascadeSignals(
             attitude_demand=turn.demand,
@@ -232,7 +296,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         )
         output = ControlOutput(Wrench(thrust, torque_B), direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
-        return CascadeMemory(position_memory, attitude_memory, turn.after), output, self._record(*own, *recorded)
+        return CascadeMemory(position_memory, attitude_memory, turn.after, (axis, poles) if self.settings.relaxed else ()), output, self._record(*own, *recorded)
 
 
 def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:

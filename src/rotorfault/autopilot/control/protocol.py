@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple
 
-from rotorfault.autopilot.allocation.available import thrust_available
+from rotorfault.autopilot.allocation.available import thrust_available, thrusts_in_balance
 from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.autopilot.presets import presets
@@ -37,6 +37,7 @@ class ControlInputs(NamedTuple):
     prediction: Prediction
     residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
+    thrust_with_yaw: Scalar = 0.0
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -81,6 +82,7 @@ def _inputs(instant: Instant) -> ControlInputs:
         prediction=instant.prediction,
         residual_speed=instant.expectation.residual_speed,
         thrust_available=thrust_available(instant.vehicle, believed.loss, believed.stuck),
+        thrust_with_yaw=thrusts_in_balance(instant.vehicle, believed.loss, believed.stuck)[0],
     )
 
 
