@@ -54,7 +54,7 @@ def motion(craft: Vehicle, hover: RelaxedHover) -> tuple[np.ndarray, np.ndarray]
     damping = np.array([*craft.air.damping])  # type: ignore[union-attr]
 
     def slope(t: float, y: np.ndarray) -> np.ndarray:
-        n, omega, v = y[:3], y[3:6], y[6:]
+        n, omega = y[:3], y[3:6]
         inside = J * omega + np.array([0.0, 0.0, momentum])
         turn = (torque - damping * omega - np.cross(omega, inside)) / J
         climb = F.sum() * n[2] / craft.mass - craft.gravity

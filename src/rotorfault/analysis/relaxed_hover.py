@@ -7,9 +7,10 @@ on a small circle. Body rates omega, thrusts F and the vertical n in body axes d
 .. math:: \omega = w\,n, \qquad \tau(F) + \tau_{gyro}(\omega) + \tau_{air}(\omega) = \omega\times J\omega, \qquad
           n_z \sum_i F_i = m g
 
-Where there is one at rest, hover is not relaxed. Of all others the one with the least power, the sum of :math:`F_i^{3/2}`, whose living rotors each keep a
-*reserve*: a share of their mean thrust that none falls below, as much as asked for where that is possible. Without
-one, the rotor opposite a dead one could stand still and push to one side only.
+Where there is one at rest, hover is not relaxed. Of all others the one with the least power, the sum of
+:math:`F_i^{3/2}`, whose living rotors each keep a *reserve*: a share of their mean thrust that none falls below, as
+much as asked for where that is possible. Without one, the rotor opposite a dead one could stand still and push to one
+side only.
 
 Source of the idea: M. W. Mueller, R. D'Andrea, "Stability and control of a quadrocopter despite the complete loss of
 one, two, or three propellers", ICRA 2014, and "Relaxed hover solutions for multicopters", IJRR 35(8), 2016. Flying so
@@ -114,7 +115,9 @@ class _Problem:
         self.weight = float(vehicle.mass * vehicle.gravity)
         self.mean = self.weight / len(self.living)
         # N m: brings torques to a size of about 1.
-        self.torque = self.weight * max(math.hypot(x, y) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
+        self.torque = self.weight * max(
+            math.hypot(x, y) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)
+        )
 
     def split(self, x: Array) -> tuple[PerRotor, Vec3]:
         """Thrusts of all rotors in N, and body rates in rad/s."""
@@ -186,7 +189,7 @@ class _Problem:
         return x if left < _BALANCED else None
 
     def best(self, reserve: float) -> Array | None:
-        """The motion with the least power that the searches find, one at rest if there is any; None if there is none."""
+        """The motion with the least power that searches find, one at rest if there is any; None if there is none."""
         rest, *turning = self.starts()
         if (still := self.solve(rest, reserve, fastest=0.0)) is not None:
             return still

@@ -62,7 +62,9 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
         + drag_acceleration(vehicle, -v_W)
         + e.direct_acceleration_W
     )
-    torque_B = wrench.torque_B if vehicle.air == () else wrench.torque_B + torque_of_turning(vehicle, omega_B, e.speed)
+    torque_B = (
+        wrench.torque_B if vehicle.air == () else wrench.torque_B + torque_of_turning(vehicle, omega_B, e.speed)
+    )
     turn = angular_acceleration(vehicle, torque_B, omega_B, e.residual_speed)
     return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle, stuck.rotor))
 

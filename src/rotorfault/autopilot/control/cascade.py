@@ -14,6 +14,8 @@ Axis and heading pass a critically damped second-order command filter, exact for
 sampling period; its rate and acceleration are the attitude reference's, and the attitude group turns the error into
 torque = J (u_a + d(omega_ref)/dt - W omega_ref). What error and rates are: `rotorfault.autopilot.control.attitude`.
 
+Where a dead rotor leaves no balance of yaw, `rotorfault.autopilot.control.relaxed` steers a spinning body.
+
 The unphysical option ``six_inputs`` is the paper's literal (34): accelerations on x and y act directly, the
 attitude reference is level, thrust and torques still pass through the rotors.
 """
@@ -21,7 +23,7 @@ attitude reference is level, thrust and torques still pass through the rotors.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple, cast, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, create_model
 
@@ -37,19 +39,26 @@ from rotorfault.autopilot.control.protocol import (
     SlidingSignals,
     TrackingError,
 )
-from rotorfault.autopilot.control.relaxed import Leaning, lean, leaning_quat, turn_to, upright
+from rotorfault.autopilot.control.relaxed import (
+    RelaxedMemory,
+    RelaxedParameters,
+    RelaxedSettings,
+    at_rest,
+    relaxed_parameters,
+)
 from rotorfault.autopilot.control.sdre import gyroscopic_drift
-from rotorfault.autopilot.control.spectral import Complex, SpinProblem, gain, improve
-from rotorfault.autopilot.control.spectral import start as spin_start
+from rotorfault.autopilot.control.spinning import Spinning
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
 from rotorfault.model.block import Context, Record
-from rotorfault.model.motion import drag_acceleration, torque_of_motion
+from rotorfault.model.motion import drag_acceleration
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle, rotor_momentum, wrench_of
+from rotorfault.model.vehicle import Vehicle, wrench_of
+
+YawLost = Literal["relaxed", "upright"]
 
 
 class CascadeSettings(Strict):
@@ -85,10 +94,12 @@ class CascadeSettings(Strict):
         default="so3",
         description="so3: thrust axis and heading as rotations | euler: Euler rates taken for body rates, as in (3)",
     )
-    relaxed: bool = Field(default=False, description="where yaw cannot be held, hover about an axis that leans")
-    push: float = Field(default=0.3, ge=0.0, le=1.0, description="share")
-    lean_max: float = Field(default=0.35, gt=0.0, lt=1.5, description="[rad]")
-    axis_time: float = Field(default=0.5, gt=0.0, description="[s]")
+    yaw_lost: YawLost = Field(
+        default="relaxed",
+        description="where yaw cannot be held: relaxed: spins about an axis that leaves its rotors room | upright: "
+        "about body z; laws without weights, and `euler`, are always upright",
+    )
+    relaxed: RelaxedSettings = Field(default=RelaxedSettings(), description=RelaxedSettings.__doc__)
     six_inputs: bool = Field(default=False, description="x and y accelerations act directly: unphysical, for study")
 
 
@@ -102,7 +113,7 @@ class CascadeParameters(NamedTuple):
     cos_min: Scalar
     filter_bandwidth: Scalar  # rad/s
     horizontal_lag: Scalar  # rad/s
-    leaning: Any
+    relaxed: RelaxedParameters | tuple[()]  # empty where it stays upright
 
 
 class CascadeMemory(NamedTuple):
@@ -111,7 +122,7 @@ class CascadeMemory(NamedTuple):
     position: Any
     attitude: Any
     reference: AttitudeReference
-    axis: Any
+    relaxed: RelaxedMemory | tuple[()]  # empty where it stays upright
 
 
 def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
@@ -139,15 +150,6 @@ class CascadeSignals(NamedTuple):
     gain_rate: Annotated[Mat3, Q("1/s", RPY, "gain matrix on the rate error")]
 
 
-def _first(parameters, vehicle):
-    w = parameters.law.sdre if hasattr(parameters.law, "sdre") else parameters.law
-    problem = SpinProblem(0.0, 0.0, vehicle.rotor_bandwidth, w.attitude_q_angle.x / w.attitude_r.x, w.attitude_q_rate.x / w.attitude_r.x)
-    p = spin_start(problem)
-    for _ in range(14):
-        p = improve(problem, p)
-    return p
-
-
 class Cascade(Controller[CascadeMemory, CascadeParameters]):
     """A controller made of a law: position loop, command filter, attitude loop.
 
@@ -169,15 +171,18 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def parameters(self, context: Context) -> CascadeParameters:
         """Numbers of the law and of the cascade around it."""
         s = self.settings
+        law = self.law.parameters(context)
+        weights = self.law.spin_weights(law)
+        relaxes = s.yaw_lost == "relaxed" and s.tracking == "so3" and not s.six_inputs
         return CascadeParameters(
-            self.law.parameters(context),
+            law,
             math.tan(s.tilt_max),
             s.thrust_share,
             s.fall_share,
             s.cos_min,
             s.filter_bandwidth,
             s.horizontal_lag,
-            Leaning(s.push, math.tan(s.lean_max), s.axis_time) if s.relaxed else (),
+            relaxed_parameters(s.relaxed, weights) if relaxes and weights is not None else (),
         )
 
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
@@ -190,7 +195,13 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         # Only its rate matters: surfaces begin there.
         attitude = _attitude_error(level, estimate.omega_B, level, level, nothing, Mat3.diagonal(level), level)
         law = self.law.initial(position, attitude, parameters.law)
-        return CascadeMemory(law.position, law.attitude, start, (upright(), _first(parameters, inputs.vehicle)) if self.settings.relaxed else ())
+        relaxed = parameters.relaxed
+        return CascadeMemory(
+            law.position,
+            law.attitude,
+            start,
+            () if relaxed == () else at_rest(cast("RelaxedParameters", relaxed), inputs.vehicle),
+        )
 
     def step(
         self, memory: CascadeMemory, inputs: ControlInputs, parameters: CascadeParameters, dt: Scalar
@@ -216,29 +227,14 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         else:
             axis_W, direct = force_W, zeros()
             given = outer.u + force_W - wanted
-        axis = memory.axis
-        if self.settings.relaxed:
-            axis, axis_poles = axis
-            axis = lean(axis, vehicle, believed, inputs.thrust_with_yaw, estimate.omega_B.z, inputs.residual_speed, parameters.leaning, dt)
-            to_B = turn_to(axis)
-            seen = estimate._replace(q_WB=estimate.q_WB @ leaning_quat(axis), omega_B=to_B.T @ estimate.omega_B)
-            turn = self.tracking.track(
-                memory.reference, seen, R_WB @ to_B, axis_W, reference, parameters.filter_bandwidth, dt
-            )
-            plain_rate = Vec3(turn.rate.x, turn.rate.y, 0.0)
-            free = turn.acceleration + seen.omega_B.cross(turn.rate)
-            plain_acceleration = Vec3(free.x, free.y, 0.0)
-            held = 1.0 - axis.given_up
-            rate_z = seen.omega_B.z + (turn.rate.z - seen.omega_B.z) * held
-            turn = turn._replace(
-                e=to_B @ Vec3(turn.e.x, turn.e.y, turn.e.z * held),
-                rate=to_B @ Vec3(turn.rate.x, turn.rate.y, rate_z),
-                acceleration=to_B @ Vec3(turn.acceleration.x, turn.acceleration.y, turn.acceleration.z * held),
-            )
+        bandwidth = parameters.filter_bandwidth
+        if memory.relaxed == ():
+            turn = self.tracking.track(memory.reference, estimate, R_WB, axis_W, reference, bandwidth, dt)
+            spinning = None
         else:
-            turn = self.tracking.track(
-                memory.reference, estimate, R_WB, axis_W, reference, parameters.filter_bandwidth, dt
-            )
+            relaxed = cast("RelaxedMemory", memory.relaxed), cast("RelaxedParameters", parameters.relaxed)
+            spinning = Spinning(*relaxed, inputs, dt)
+            turn = spinning.track(self.tracking, memory.reference, R_WB, axis_W, bandwidth)
 
         # Attitude loop: torque.
         attitude = _attitude_error(
@@ -251,38 +247,14 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
-        inner_nominal = -(inner.gain_e @ attitude.e) - inner.gain_rate @ attitude.e_dot
         given_B = wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B
         torque_B = self.tracking.ahead_of_lag(
-            (inner.u + attitude.feed_forward).times(vehicle.inertia),
-            given_B,
-            estimate.omega_B,
-            w0,
+            (inner.u + attitude.feed_forward).times(vehicle.inertia), given_B, estimate.omega_B, w0
         )
+        relaxed_memory = memory.relaxed
+        if spinning is not None:
+            relaxed_memory, torque_B = spinning.steer(torque_B, given_B, inner.switching)
 
-        if self.settings.relaxed:
-            w = parameters.law.sdre if hasattr(parameters.law, "sdre") else parameters.law
-            spin = seen.omega_B.z
-            J = vehicle.inertia
-            Jt = 0.5 * (J.x + J.y)
-            problem = SpinProblem(
-                spin, (J.z * spin + rotor_momentum(vehicle, inputs.residual_speed)) / Jt, w0,
-                w.attitude_q_angle.x / w.attitude_r.x, w.attitude_q_rate.x / w.attitude_r.x,
-            )
-            poles = improve(problem, axis_poles)
-            K = gain(problem, poles)
-            ahead = plain_acceleration - Vec3(0.0, 0.0, spin).cross(plain_rate)
-            target = plain_rate + Vec3(0.0, 0.0, spin)
-            omega_ref = to_B @ target
-            balance = (to_B @ ahead).times(J) - torque_of_motion(vehicle, omega_ref, inputs.residual_speed)
-            lacking = to_B.T @ (given_B - balance).over(J)
-            e_, w_, a_ = to_B.T @ turn.e, seen.omega_B - target, lacking
-            x = K.angle.times(Complex(e_.x, e_.y)), K.rate.times(Complex(w_.x, w_.y)), K.torque.times(Complex(a_.x, a_.y))
-            u_ = to_B @ Vec3(-(x[0].re + x[1].re + x[2].re), -(x[0].im + x[1].im + x[2].im), 0.0)
-            relaxed_B = balance + (u_ + inner.u - inner_nominal).times(J)
-            torque_B = torque_B + (relaxed_B - torque_B) * axis.given_up
-        else:
-            poles = ()
         thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
         own = CascadeSignals(
             attitude_demand=turn.demand,
@@ -296,7 +268,8 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         )
         output = ControlOutput(Wrench(thrust, torque_B), direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
-        return CascadeMemory(position_memory, attitude_memory, turn.after, (axis, poles) if self.settings.relaxed else ()), output, self._record(*own, *recorded)
+        after = CascadeMemory(position_memory, attitude_memory, turn.after, relaxed_memory)
+        return after, output, self._record(*own, *recorded)
 
 
 def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:

@@ -1,128 +1,236 @@
-r"""Where yaw cannot be held: the axis of the body that points along the wanted thrust, and turns about itself.
+r"""Hover where yaw cannot be held: a spinning body whose thrust axis the same SDRE law steers.
 
-Upright, with the body's z axis vertical, a quadrotor without one rotor leaves the rotor opposite nothing to do: it
-stands still and can push one way only. Turning steadily about an axis n that is fixed in the body but not z, it has
-thrusts of its own choice (relaxed hover, `rotorfault.analysis.relaxed_hover`). At a yaw rate r that axis follows from
-the torque that is wanted in balance, without a search: with :math:`\omega = (p, q, r)` parallel to n,
+**The axis.** Upright, with the body's z axis along the wanted thrust, a quadrotor without one rotor leaves the rotor
+opposite nothing to do: it stands still and can push one way only. Turning steadily about an axis n that is fixed in
+the body but not z, its rotors have thrusts of our choice (relaxed hover, `rotorfault.analysis.relaxed_hover`). At a
+yaw rate r that axis follows from the torque that is wanted in balance, without a search: with
+:math:`\omega = (p, q, r)` parallel to n,
 
-.. math:: \tau_x + ((J_y - J_z)r - J_r\Omega)\,q - d_x p = 0, \qquad
-          \tau_y + ((J_z - J_x)r + J_r\Omega)\,p - d_y q = 0, \qquad n \parallel (p, q, r)
+.. math:: \tau_x + ((J_y - J_z)r - J_r\Omega)\,q - d_xp = 0, \qquad
+          \tau_y + ((J_z - J_x)r + J_r\Omega)\,p - d_yq = 0
 
-where tau is a share, `push`, of the tilt torque with all believed rotors at the same share of what they can give. The
-yaw rate is the measured one: it finds its own balance, between the rotors' drag torque and the air's damping.
+with tau a share, `push`, of the tilt torque with all believed rotors at the same share of what they can give, and d
+the damping of roll and pitch. r is the measured yaw rate: it finds its own balance between the rotors' drag torque
+and the air.
 
-How much of yaw is given up goes from 0 to 1 as the thrust that believed rotors have with yaw in balance falls from the
-weight to `YAW_LOST` of it; the axis moves from z to n with the time constant `axis_time`. With yaw given up the law
-sees no yaw error, and what it sees of the other two it sees in a frame whose z axis is n.
+**The law.** Error, rates and torque are seen in a frame whose z axis is n, roll and pitch of it as one complex
+number. Its gains solve the Riccati equation of `rotorfault.autopilot.control.spin_riccati`, whose states are error,
+rate and the angular acceleration that the lagging rotors give, with the weights (35) of roll and pitch, their means.
+What it leaves to feed-forward is the balance of the turning itself, with the believed inertia as it is; the switching
+input of the sliding surface is added as elsewhere.
+
+**When.** How much of yaw is given up goes from 0 to 1 as the thrust that believed rotors have with yaw in balance
+falls from the weight to `YAW_LOST` of it. The torque is shared between the law that holds yaw and this one in that
+ratio, and the axis moves from z to n with the time constant `time`, so nothing jumps.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from pydantic import Field
+
+from rotorfault.autopilot.control.spin_riccati import (
+    Complex,
+    Poles,
+    SpinProblem,
+    improve,
+    optimal,
+    spin_gain,
+)
+from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, clip, maximum, minimum, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics
-from rotorfault.model.motion import effect_of
+from rotorfault.model.motion import effect_of, torque_of_motion
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.vehicle import Vehicle, rotor_momentum, wrench_of
 
-YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below it, at hover the altitude would be lost within a second
+YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that holds yaw loses a metre in two seconds
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 
 
-class RelaxedAxis(NamedTuple):
-    """Of the body, and how far yaw is given up."""
+class RelaxedSettings(Strict):
+    """How it hovers where yaw cannot be held."""
+
+    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust. With 0.3 a quadrotor
+    # without one rotor gives it a quarter to a half of what the other two give each.
+    push: float = Field(
+        default=0.3, ge=0.0, le=1.0, description="share of the tilt torque that living rotors have at equal shares"
+    )
+    # 20 degrees: costs 6 % of lift.
+    lean: float = Field(default=0.35, gt=0.0, lt=1.5, description="largest angle of the axis to body z [rad]")
+    time: float = Field(default=0.5, gt=0.0, description="time constant with which the axis moves [s]")
+
+
+class SpinWeights(NamedTuple):
+    """Weights of roll and pitch, their means."""
+
+    angle: Scalar  # 1/s^4: q of the angle over r
+    rate: Scalar  # 1/s^2: q of the rate over r
+
+
+class RelaxedParameters(NamedTuple):
+    """Numbers of relaxed hover."""
+
+    push: Scalar
+    lean: Scalar  # tangent
+    time: Scalar  # s
+    weights: SpinWeights
+
+
+class RelaxedMemory(NamedTuple):
+    """Axis and gain of relaxed hover."""
 
     lean: Vec3  # (n_x, n_y)/n_z, and 0
-    given_up: Scalar  # 0 to 1
+    poles: Poles  # of the closed loop
 
 
-class Leaning(NamedTuple):
-    """Numbers of the relaxed axis."""
+class RelaxedAxis(NamedTuple):
+    """The axis at one sampling instant."""
 
-    push: Scalar  # 0 to 1
-    most: Scalar  # tangent of the largest angle between the axis and body z
-    time: Scalar  # s
-
-
-def upright() -> RelaxedAxis:
-    """The body's z axis, yaw held."""
-    return RelaxedAxis(zeros(), 0.0)
+    memory: RelaxedMemory
+    given_up: Scalar  # 0 to 1: share of yaw
+    to_B: Mat3  # from the frame with n for its z axis to the body's
+    turn: Quat  # the same
 
 
-def lean(
-    memory: RelaxedAxis,
+class TurningError(NamedTuple):
+    """What relaxed hover corrects, in the frame with n for its z axis."""
+
+    e: Vec3  # rad: of the thrust axis
+    omega: Vec3  # rad/s: of the body
+    rate: Vec3  # rad/s: wanted about x and y
+    acceleration: Vec3  # rad/s^2: derivative of the wanted rate, as seen from the world
+
+
+def relaxed_parameters(settings: RelaxedSettings, weights: SpinWeights) -> RelaxedParameters:
+    """Numbers of the settings as a record."""
+    return RelaxedParameters(settings.push, math.tan(settings.lean), settings.time, weights)
+
+
+def at_rest(parameters: RelaxedParameters, vehicle: Vehicle) -> RelaxedMemory:
+    """The body's z axis, and the gain of a body that does not spin."""
+    weights = parameters.weights
+    return RelaxedMemory(
+        zeros(), optimal(SpinProblem(0.0, 0.0, vehicle.rotor_bandwidth, weights.angle, weights.rate))
+    )
+
+
+def relaxed_axis(
+    memory: RelaxedMemory,
     vehicle: Vehicle,
     believed: Diagnosis,
     with_yaw: Scalar,
-    yaw_rate: Scalar,
+    omega_B: Vec3,
     residual_speed: Scalar,
-    numbers: Leaning,
+    parameters: RelaxedParameters,
     dt: Scalar,
 ) -> RelaxedAxis:
-    """The axis one period later.
+    """The axis that is to point along the wanted thrust.
 
     Parameters
     ----------
-    memory : RelaxedAxis
+    memory : RelaxedMemory
     vehicle : Vehicle
         As believed.
     believed : Diagnosis
         Of its rotors.
     with_yaw : scalar, N
         Thrust that the believed rotors have with yaw in balance.
-    yaw_rate : scalar, rad/s
-        Of the body.
+    omega_B : Vec3, rad/s
+        Body rates.
     residual_speed : scalar, rad/s
         Believed Omega of (4).
-    numbers : Leaning
+    parameters : RelaxedParameters
     dt : scalar, s
         Sampling period.
     """
     weight = vehicle.mass * vehicle.gravity
-    given_up = clip((1.0 - with_yaw / weight) / (1.0 - YAW_LOST), 0.0, 1.0)
-    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
-    alike: PerRotor = able * (weight / maximum(able.sum(), 1e-3 * weight))
-    tau = wrench_of(vehicle, alike).torque_B * (numbers.push * given_up)
-    J, h, r = vehicle.inertia, rotor_momentum(vehicle, residual_speed), yaw_rate
-    damping = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
-    cx, cy = (J.y - J.z) * r - h, (J.z - J.x) * r + h
-    # (p, q) r = adj(M) (-tau) r / det(M), the quotient kept finite where the body hardly turns.
-    det = damping.x * damping.y - cx * cy
-    scale = r / (maximum(det, 0.0) * maximum(r * r, LEAST_RATE * LEAST_RATE) + 1e-12)
-    nx, ny = (damping.y * tau.x + cx * tau.y) * scale, (cy * tau.x + damping.x * tau.y) * scale
-    size = sqrt(nx * nx + ny * ny + 1e-18)
-    within = minimum(numbers.most / size, 1.0)
-    share = dt / (numbers.time + dt)
-    return RelaxedAxis(
-        Vec3(
-            memory.lean.x + (nx * within - memory.lean.x) * share,
-            memory.lean.y + (ny * within - memory.lean.y) * share,
-            0.0,
-        ),
-        given_up,
-    )
-
-
-def turn_to(axis: RelaxedAxis) -> Mat3:
-    """Matrix that takes coordinates of the frame with n for its z axis to body coordinates: the shortest turn."""
-    x, y = axis.lean.x, axis.lean.y
-    z = 1.0 / sqrt(1.0 + x * x + y * y)
-    nx, ny = x * z, y * z
+    given_up = clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
+    wanted = _wanted_lean(vehicle, believed, omega_B.z, residual_speed, parameters.push * given_up)
+    size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
+    wanted = wanted * minimum(parameters.lean / size, 1.0)
+    lean = memory.lean + (wanted - memory.lean) * (dt / (parameters.time + dt))
+    # The shortest turn from z to n.
+    z = 1.0 / sqrt(1.0 + lean.x * lean.x + lean.y * lean.y)
+    x, y = lean.x * z, lean.y * z
     k = 1.0 / (1.0 + z)
-    return Mat3(
-        1.0 - nx * nx * k, -nx * ny * k, nx,
-        -nx * ny * k, 1.0 - ny * ny * k, ny,
-        -nx, -ny, z,
-    )  # fmt: skip
-
-
-def leaning_quat(axis: RelaxedAxis) -> Quat:
-    """The same turn as a quaternion."""
-    x, y = axis.lean.x, axis.lean.y
-    z = 1.0 / sqrt(1.0 + x * x + y * y)
     w = sqrt(0.5 * (1.0 + z))
     half = 0.5 / w
-    return Quat(w, -y * z * half, x * z * half, 0.0)
+    to_B = Mat3(
+        1.0 - x * x * k, -x * y * k, x,
+        -x * y * k, 1.0 - y * y * k, y,
+        -x, -y, z,
+    )  # fmt: skip
+    return RelaxedAxis(memory._replace(lean=lean), given_up, to_B, Quat(w, -y * half, x * half, 0.0))
+
+
+def _wanted_lean(vehicle: Vehicle, believed: Diagnosis, spin: Scalar, residual_speed: Scalar, push: Scalar) -> Vec3:
+    """(n_x, n_y)/n_z of the axis about which a spinning body balances a share of its tilt torque."""
+    weight = vehicle.mass * vehicle.gravity
+    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
+    # Where nothing lives the sum is 0; the floor keeps the quotient a number.
+    alike: PerRotor = able * (weight / maximum(able.sum(), 1e-3 * weight))
+    tau = wrench_of(vehicle, alike).torque_B * push
+    J, momentum = vehicle.inertia, rotor_momentum(vehicle, residual_speed)
+    d = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
+    cx, cy = (J.y - J.z) * spin - momentum, (J.z - J.x) * spin + momentum
+    # (p, q)/r by Cramer's rule. Where the body hardly turns, or has no balance, the floors keep it finite.
+    fast = maximum(spin * spin, LEAST_RATE * LEAST_RATE)
+    tiny = 1e-6 * (J.x * J.y) * LEAST_RATE * LEAST_RATE
+    scale = spin / (maximum(d.x * d.y - cx * cy, tiny) * fast)
+    return Vec3((d.y * tau.x + cx * tau.y) * scale, (cy * tau.x + d.x * tau.y) * scale, 0.0)
+
+
+def relaxed_torque(
+    axis: RelaxedAxis,
+    error: TurningError,
+    given_B: Vec3,
+    switching_B: Vec3,
+    vehicle: Vehicle,
+    residual_speed: Scalar,
+    parameters: RelaxedParameters,
+) -> tuple[RelaxedMemory, Vec3]:
+    """Torque that steers the axis, and the memory of the next instant.
+
+    Parameters
+    ----------
+    axis : RelaxedAxis
+    error : TurningError
+    given_B : Vec3, N m
+        Torque that the believed rotors give now.
+    switching_B : Vec3, rad/s^2
+        Switching input of the law.
+    vehicle : Vehicle
+        As believed.
+    residual_speed : scalar, rad/s
+        Believed Omega of (4).
+    parameters : RelaxedParameters
+
+    Returns
+    -------
+    memory : RelaxedMemory
+    torque_B : Vec3
+        In N m, body axes.
+    """
+    J, spin, to_B = vehicle.inertia, error.omega.z, axis.to_B
+    across = 0.5 * (J.x + J.y)
+    precession = (J.z * spin + rotor_momentum(vehicle, residual_speed)) / across
+    weights = parameters.weights
+    problem = SpinProblem(spin, precession, vehicle.rotor_bandwidth, weights.angle, weights.rate)
+    poles = improve(problem, axis.memory.poles)
+    gain = spin_gain(problem, poles)
+    # What keeps the error at zero: a wanted axis that moves in the world turns backwards in the body.
+    turning = Vec3(error.rate.x, error.rate.y, spin)
+    ahead = error.acceleration - Vec3(0.0, 0.0, spin).cross(error.rate)
+    balance_B = (to_B @ ahead).times(J) - torque_of_motion(vehicle, to_B @ turning, residual_speed)
+    lacking = to_B.T @ (given_B - balance_B).over(J)
+    rate = error.omega - turning
+    fed_back = [
+        factor.times(Complex(state.x, state.y)) for factor, state in zip(gain, (error.e, rate, lacking), strict=True)
+    ]
+    u = Vec3(-sum(term.re for term in fed_back), -sum(term.im for term in fed_back), 0.0)
+    return axis.memory._replace(poles=poles), balance_B + (to_B @ u + switching_B).times(J)

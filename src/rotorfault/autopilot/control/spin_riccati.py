@@ -26,6 +26,9 @@ from typing import NamedTuple
 
 from rotorfault.maths.scalar import Scalar, sqrt
 
+# Wilson's steps from afar: each halves the distance until it is small, then squares it.
+STEPS = 16
+
 
 class Complex(NamedTuple):
     """A complex number of two scalars."""
@@ -64,14 +67,34 @@ class SpinGain(NamedTuple):
     torque: Complex
 
 
-def start(problem: SpinProblem) -> Poles:
-    """A stable polynomial to begin with: three equal real poles, of about the size of the optimal ones."""
+def optimal(problem: SpinProblem) -> Poles:
+    """The solution, to rounding, from three equal real poles at least as fast as the optimal ones.
+
+    Parameters
+    ----------
+    problem : SpinProblem
+    """
     size = sqrt(problem.bandwidth * problem.bandwidth + sqrt(problem.angle) + problem.rate)
-    return Poles(Complex(0.0, -3.0 * size), Complex(-3.0 * size * size, 0.0), Complex(0.0, size * size * size))
+    poles = Poles(Complex(0.0, -3.0 * size), Complex(-3.0 * size * size, 0.0), Complex(0.0, size * size * size))
+    for _ in range(STEPS):
+        poles = improve(problem, poles)
+    return poles
 
 
 def improve(problem: SpinProblem, poles: Poles) -> Poles:
-    """One of Wilson's steps."""
+    """One of Wilson's steps.
+
+    Parameters
+    ----------
+    problem : SpinProblem
+    poles : Poles
+        All in the left half plane.
+
+    Returns
+    -------
+    Poles
+        All in the left half plane too; not finite where two of the old ones were mirrored about the imaginary axis.
+    """
     r, beta, w = problem.spin, problem.precession, problem.bandwidth
     (x2, y2), (x1, y1), (x0, y0) = poles
     # nu^2 (nu - beta)^2 ((nu - r)^2 + w^2) + w^2 (q_e + q_w nu^2)
@@ -100,8 +123,14 @@ def improve(problem: SpinProblem, poles: Poles) -> Poles:
     return Poles(Complex(u2, v2), Complex(c1 + d1 * v2, v1), Complex(c0 + d0 * v2 + g0 * v1, v0))
 
 
-def gain(problem: SpinProblem, poles: Poles) -> SpinGain:
-    """The feedback that puts the poles there."""
+def spin_gain(problem: SpinProblem, poles: Poles) -> SpinGain:
+    """The feedback that puts the poles there.
+
+    Parameters
+    ----------
+    problem : SpinProblem
+    poles : Poles
+    """
     r, beta, w = problem.spin, problem.precession, problem.bandwidth
     b2, b1, b0 = poles
     a2, a1, a0 = Complex(-b2.im, b2.re), Complex(-b1.re, -b1.im), Complex(b0.im, -b0.re)
