@@ -227,7 +227,9 @@ def relaxed_torque(
     turning = Vec3(error.rate.x, error.rate.y, spin)
     ahead = error.acceleration - Vec3(0.0, 0.0, spin).cross(error.rate)
     balance_B = (to_B @ ahead).times(J) - torque_of_motion(vehicle, to_B @ turning, residual_speed)
-    lacking = to_B.T @ (given_B - balance_B).over(J)
+    # Of yaw nothing is lacking: what the air takes there is no error.
+    over = given_B - balance_B
+    lacking = to_B.T @ Vec3(over.x / J.x, over.y / J.y, 0.0)
     rate = error.omega - turning
     fed_back = [
         factor.times(Complex(state.x, state.y)) for factor, state in zip(gain, (error.e, rate, lacking), strict=True)
