@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         critical_thrust_to_weight,
     )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.analysis.relaxed_hover import RelaxedHover, relaxed_hover
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
     from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
@@ -117,6 +118,7 @@ _HOME = {
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
     "ReferenceWarning": "base.errors",
+    "RelaxedHover": "analysis.relaxed_hover",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "Wrench": "model.signals",
@@ -142,6 +144,7 @@ _HOME = {
     "load_vehicle": "model.vehicle_file",
     "neighbour": "scenario.neighbours",
     "register": "model.slot",
+    "relaxed_hover": "analysis.relaxed_hover",
     "repeat": "flight.fly",
     "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
@@ -194,6 +197,7 @@ __all__ = [
     "ReferenceSource",
     "ReferenceTable",
     "ReferenceWarning",
+    "RelaxedHover",
     "Response",
     "ResponseInputs",
     "Scenario",
@@ -231,6 +235,7 @@ __all__ = [
     "load_vehicle",
     "neighbour",
     "register",
+    "relaxed_hover",
     "repeat",
     "scenario_names",
     "torque_reserve",

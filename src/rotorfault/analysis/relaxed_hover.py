@@ -28,6 +28,7 @@ from scipy.optimize import minimize
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
+from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, sqrt
@@ -36,6 +37,7 @@ from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.vehicle import Vehicle, in_air, residual_speed, rotor_speeds, wrench_of
 
 RESERVE = 0.5  # our choice: a rotor at half of the mean thrust can fall by as much as it can rise to the mean
+GYRO_END = math.radians(2000.0)  # rad/s: end of the usual largest range of small gyros, such as the BMI088's
 FASTEST = 2000.0  # rad/s: of the body, far beyond what holds together; bounds the search
 _BALANCED = 1e-7  # of what is left of an equation, each brought to a size of about 1
 
@@ -90,9 +92,40 @@ def relaxed_hover(vehicle: Vehicle, dead: Sequence[int] = (), reserve: float = R
     if found is None:  # with less reserve; where there is nothing without any, there is nothing
         least = problem.best(0.0)
         if least is None:
-            return _impossible(vehicle, gone, "no steady spin carries the weight within the limits of the rotors")
+            return _impossible(vehicle, gone, problem.why_none())
         found = next((x for share in (0.5, 0.25) if (x := problem.best(share * reserve)) is not None), least)
     return problem.result(found)
+
+
+def relaxed_lines(hover: RelaxedHover, vehicle: Vehicle) -> list[str]:
+    """Relaxed hover as text.
+
+    Parameters
+    ----------
+    hover : RelaxedHover
+    vehicle : Vehicle
+        The one that it is of.
+
+    Returns
+    -------
+    list of str
+    """
+    gone = f"rotor{'s' if len(hover.dead) > 1 else ''} {', '.join(map(str, hover.dead))} dead"
+    if not hover.possible:
+        return [f"Relaxed hover, {gone}: not possible; {hover.why}"]
+    turning = math.isfinite(hover.period)
+    rates = ", ".join(f"{float(rate):.3g}" for rate in hover.omega_B)
+    rows = [
+        ("thrusts [N]", ", ".join(f"{number}: {float(f):.4g}" for number, f in enumerate(hover.thrust, start=1))),
+        ("least thrust of a living rotor", f"{hover.reserve:.3g} of their mean"),
+        ("body rates p, q, r [rad/s]", f"{rates}; a turn takes {hover.period:.3g} s" if turning else "0, it stands"),
+        ("tilt", f"{math.degrees(hover.tilt):.3g} deg, on a circle of {hover.radius:.2g} m" if turning else "0"),
+        ("power", f"{hover.power:.3g} times that of hover with all rotors"),
+    ]
+    note = []
+    if turning and float(hover.omega_B.norm()) > GYRO_END:
+        note = [f"  that is more than the {GYRO_END:.3g} rad/s (2,000 deg/s) at which common gyros end"]
+    return [f"Relaxed hover, {gone}", *table_lines(rows, "<<", indent=2), *note]
 
 
 def _dead(vehicle: Vehicle, dead: Sequence[int]) -> tuple[int, ...]:
@@ -195,6 +228,14 @@ class _Problem:
             return still
         found = [motion for start in turning if (motion := self.solve(start, reserve)) is not None]
         return min(found, key=self.power, default=None)
+
+    def why_none(self) -> str:
+        """What is to be said where the searches found none."""
+        air = self.vehicle.air
+        assert isinstance(air, Aerodynamics)
+        if not any((*air.damping, *air.damping_squared, air.rotor_drag)):
+            return "nothing of this vehicle damps a spin; see air.damping_yaw and air.rotor_drag of vehicle files"
+        return "no steady spin carries the weight within the limits of the rotors"
 
     def without_search(self) -> str:
         """What stands against any such motion, where that is plain; else empty."""
