@@ -36,7 +36,7 @@ from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.vehicle import Vehicle, in_air, residual_speed, rotor_speeds, wrench_of
 
-RESERVE = 0.5  # our choice: a rotor at half of the mean thrust can fall by as much as it can rise to the mean
+RESERVE = 0.3  # as the cascade of controllers has it
 GYRO_END = math.radians(2000.0)  # rad/s: end of the usual largest range of small gyros, such as the BMI088's
 FASTEST = 2000.0  # rad/s: of the body, far beyond what holds together; bounds the search
 _BALANCED = 1e-7  # of what is left of an equation, each brought to a size of about 1

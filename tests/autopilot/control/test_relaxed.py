@@ -50,7 +50,7 @@ def axis_of(
 @pytest.mark.parametrize("dead", [1, 2, 3, 4])
 def test_the_axis_is_that_of_relaxed_hover_with_those_thrusts(dead: int) -> None:
     vehicle = mueller()
-    parameters = relaxed_parameters(RelaxedSettings(push=0.3, lean=1.2, time=0.1), WEIGHTS)
+    parameters = relaxed_parameters(RelaxedSettings(reserve=0.3, lean=1.2, time=0.1), WEIGHTS)
     hover = relaxed_hover(vehicle, [dead])
     speeds = rotor_speeds(vehicle, hover.thrust)
     axis = axis_of(vehicle, dead, hover.omega_B, float(residual_speed(vehicle, speeds)), parameters)
@@ -98,7 +98,7 @@ def test_with_yaw_in_balance_nothing_is_given_up() -> None:
 
 def test_the_axis_stays_within_its_limit_and_is_finite_at_rest() -> None:
     vehicle = mueller()
-    parameters = relaxed_parameters(RelaxedSettings(push=1.0, lean=0.2), WEIGHTS)
+    parameters = relaxed_parameters(RelaxedSettings(reserve=1.0, lean=0.2), WEIGHTS)
     for spin in (0.0, 1e-9, 0.5, 3.0, -3.0):
         axis = axis_of(vehicle, 1, Vec3(0.0, 0.0, spin), 0.0, parameters, steps=3000)
         lean = math.hypot(axis.memory.lean.x, axis.memory.lean.y)

@@ -251,11 +251,11 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         torque_B = self.tracking.ahead_of_lag(
             (inner.u + attitude.feed_forward).times(vehicle.inertia), given_B, estimate.omega_B, w0
         )
+        wrench = Wrench(vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min), torque_B)
         relaxed_memory = memory.relaxed
         if spinning is not None:
-            relaxed_memory, torque_B = spinning.steer(torque_B, given_B, inner.switching)
+            relaxed_memory, wrench = spinning.steer(wrench, given_B, inner.switching)
 
-        thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
         own = CascadeSignals(
             attitude_demand=turn.demand,
             attitude_command=turn.command,
@@ -266,7 +266,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             gain_angle=inner.gain_e,
             gain_rate=inner.gain_rate,
         )
-        output = ControlOutput(Wrench(thrust, torque_B), direct)
+        output = ControlOutput(wrench, direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
         after = CascadeMemory(position_memory, attitude_memory, turn.after, relaxed_memory)
         return after, output, self._record(*own, *recorded)

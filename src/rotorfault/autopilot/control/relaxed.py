@@ -9,9 +9,10 @@ yaw rate r that axis follows from the torque that is wanted in balance, without 
 .. math:: \tau_x + ((J_y - J_z)r - J_r\Omega)\,q - d_xp = 0, \qquad
           \tau_y + ((J_z - J_x)r + J_r\Omega)\,p - d_yq = 0
 
-with tau a share, `push`, of the tilt torque with all believed rotors at the same share of what they can give, and d
-the damping of roll and pitch. r is the measured yaw rate: it finds its own balance between the rotors' drag torque
-and the air.
+with d the damping of roll and pitch, and tau the tilt torque of the thrusts wanted in balance: between those without
+any tilt torque, which may be below zero, and those of all believed rotors at the same share of what they can give,
+the first at which each living rotor keeps a `reserve`. r is the measured yaw rate: it finds its own balance between
+the rotors' drag torque and the air.
 
 **The law.** Error, rates and torque are seen in a frame whose z axis is n, roll and pitch of it as one complex
 number. Its gains solve the Riccati equation of `rotorfault.autopilot.control.spin_riccati`, whose states are error,
@@ -42,23 +43,24 @@ from rotorfault.autopilot.control.spin_riccati import (
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
-from rotorfault.maths.scalar import Scalar, clip, maximum, minimum, sqrt
+from rotorfault.maths.scalar import Scalar, clip, greater, maximum, minimum, select, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import effect_of, torque_of_motion
-from rotorfault.model.signals import Diagnosis
+from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.vehicle import Vehicle, rotor_momentum, wrench_of
 
 YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that holds yaw loses a metre in two seconds
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
+RIDGE = 1e-6  # relative
 
 
 class RelaxedSettings(Strict):
     """How it hovers where yaw cannot be held."""
 
-    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust. With 0.3 a quadrotor
-    # without one rotor gives it a quarter to a half of what the other two give each.
-    push: float = Field(
-        default=0.3, ge=0.0, le=1.0, description="share of the tilt torque that living rotors have at equal shares"
+    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust.
+    reserve: float = Field(
+        default=0.3, ge=0.0, le=1.0, description="least thrust of a living rotor, as a share of equal ones"
     )
     # 20 degrees: costs 6 % of lift.
     lean: float = Field(default=0.35, gt=0.0, lt=1.5, description="largest angle of the axis to body z [rad]")
@@ -75,7 +77,7 @@ class SpinWeights(NamedTuple):
 class RelaxedParameters(NamedTuple):
     """Numbers of relaxed hover."""
 
-    push: Scalar
+    reserve: Scalar
     lean: Scalar  # tangent
     time: Scalar  # s
     weights: SpinWeights
@@ -108,7 +110,7 @@ class TurningError(NamedTuple):
 
 def relaxed_parameters(settings: RelaxedSettings, weights: SpinWeights) -> RelaxedParameters:
     """Numbers of the settings as a record."""
-    return RelaxedParameters(settings.push, math.tan(settings.lean), settings.time, weights)
+    return RelaxedParameters(settings.reserve, math.tan(settings.lean), settings.time, weights)
 
 
 def at_rest(parameters: RelaxedParameters, vehicle: Vehicle) -> RelaxedMemory:
@@ -150,7 +152,9 @@ def relaxed_axis(
     """
     weight = vehicle.mass * vehicle.gravity
     given_up = clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
-    wanted = _wanted_lean(vehicle, believed, omega_B.z, residual_speed, parameters.push * given_up)
+    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
+    tau = _wanted_torque(vehicle, able, parameters.reserve) * given_up
+    wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed)
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
     lean = memory.lean + (wanted - memory.lean) * (dt / (parameters.time + dt))
@@ -168,13 +172,56 @@ def relaxed_axis(
     return RelaxedAxis(memory._replace(lean=lean), given_up, to_B, Quat(w, -y * half, x * half, 0.0))
 
 
-def _wanted_lean(vehicle: Vehicle, believed: Diagnosis, spin: Scalar, residual_speed: Scalar, push: Scalar) -> Vec3:
-    """(n_x, n_y)/n_z of the axis about which a spinning body balances a share of its tilt torque."""
+def _wanted_torque(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> Vec3:
+    """Torque of the believed rotors in N m when they carry the weight and each living one keeps a reserve."""
     weight = vehicle.mass * vehicle.gravity
-    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
     # Where nothing lives the sum is 0; the floor keeps the quotient a number.
     alike: PerRotor = able * (weight / maximum(able.sum(), 1e-3 * weight))
-    tau = wrench_of(vehicle, alike).torque_B * push
+    level = _thrusts_for(vehicle, able, Wrench(weight, zeros()))
+    short, room = alike * reserve - level, alike - level
+    share = short.map(lambda lacks, r: select(greater(lacks, 0.0), lacks / maximum(r, 1e-9 * weight), 0.0), room)
+    push = minimum(share.reduce(maximum), 1.0)
+    return wrench_of(vehicle, level + room * push).torque_B
+
+
+def _thrusts_for(vehicle: Vehicle, able: PerRotor, wrench: Wrench) -> PerRotor:
+    """Thrusts in N that give a thrust and tilt torque, least squares by what rotors can give, yaw left open."""
+    rows = effectiveness(vehicle)[:3]
+    xx, xy, xz, yy, yz, zz = ((rows[i] * rows[j]).dot(able) for i in range(3) for j in range(i, 3))
+    # Of rotors in one line an axis is out of reach: a millionth of ridge, and nothing is asked of it. The floors keep
+    # it a number where nothing lives.
+    ridge = RIDGE * maximum(yy + zz, 1e-9)
+    M = Mat3(xx, xy, xz, xy, yy + ridge, yz, xz, yz, zz + ridge)
+    per = M.adjugate() @ Vec3(wrench.thrust, wrench.torque_B.x, wrench.torque_B.y)
+    per = per * (1.0 / maximum(M.det(), 1e-9 * ridge * ridge))
+    thrust: PerRotor = (rows[0] * per.x + rows[1] * per.y + rows[2] * per.z) * able
+    return thrust
+
+
+def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench) -> Wrench:
+    """The wrench that comes of a thrust and tilt torque when each rotor is put within its limits.
+
+    An allocation that serves tilt before thrust would stop all rotors for a torque that they can only work against.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    believed : Diagnosis
+        Of its rotors.
+    wrench : Wrench
+        Wanted; its yaw torque is not looked at.
+    """
+    effect = effect_of(vehicle, believed.loss, believed.stuck)
+    low, high = effect * vehicle.thrust_min, effect * vehicle.thrust_max
+    held = believed.stuck.thrust
+    moving = wrench_of(vehicle, held)
+    left = Wrench(wrench.thrust - moving.thrust, wrench.torque_B - moving.torque_B)
+    return wrench_of(vehicle, _thrusts_for(vehicle, high, left).map(clip, low, high) + held)
+
+
+def _wanted_lean(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar) -> Vec3:
+    """(n_x, n_y)/n_z of the axis about which a spinning body balances a tilt torque."""
     J, momentum = vehicle.inertia, rotor_momentum(vehicle, residual_speed)
     d = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
     cx, cy = (J.y - J.z) * spin - momentum, (J.z - J.x) * spin + momentum

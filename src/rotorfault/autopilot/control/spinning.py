@@ -10,11 +10,16 @@ from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
     RelaxedParameters,
     TurningError,
+    attainable,
     relaxed_axis,
     relaxed_torque,
 )
 from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.model.signals import Wrench
+
+# Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
+LEAST_THRUST = 0.3
 
 
 @final
@@ -52,6 +57,7 @@ class Spinning:
     ) -> Wanted:
         """What the law tracks, in body axes; of yaw so much as is held. See `AttitudeTracking.track`."""
         axis, inputs = self.axis, self.inputs
+        self.cosine = R_WB.zz
         seen = inputs.estimate._replace(q_WB=inputs.estimate.q_WB @ axis.turn, omega_B=self.omega)
         turn = tracking.track(state, seen, R_WB @ axis.to_B, f_W, inputs.reference, bandwidth, self.dt)
         fixed = turn.acceleration + self.omega.cross(turn.rate)
@@ -69,26 +75,25 @@ class Spinning:
             acceleration=in_body(turn.acceleration, 0.0),
         )
 
-    def steer(self, upright_B: Vec3, given_B: Vec3, switching_B: Vec3) -> tuple[RelaxedMemory, Vec3]:
-        """The memory of the next instant, and the torque to ask for in N m.
+    def steer(self, upright: Wrench, given_B: Vec3, switching_B: Vec3) -> tuple[RelaxedMemory, Wrench]:
+        """The memory of the next instant, and the wrench to ask for.
 
         Parameters
         ----------
-        upright_B : Vec3, N m
-            Torque of the law that holds yaw.
+        upright : Wrench
+            Of the law that holds yaw.
         given_B : Vec3, N m
             Torque that the believed rotors give now.
         switching_B : Vec3, rad/s^2
             Switching input of the law.
         """
-        after, relaxed_B = relaxed_torque(
-            self.axis,
-            self._error,
-            given_B,
-            switching_B,
-            self.inputs.vehicle,
-            self.inputs.residual_speed,
-            self.parameters,
+        inputs, given_up = self.inputs, self.axis.given_up
+        after, torque_B = relaxed_torque(
+            self.axis, self._error, given_B, switching_B, inputs.vehicle, inputs.residual_speed, self.parameters
         )
-        given_up = self.axis.given_up
-        return after, upright_B * (1.0 - given_up) + relaxed_B * given_up
+        # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
+        weight = inputs.vehicle.mass * inputs.vehicle.gravity
+        carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
+        relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
+        held = 1.0 - given_up
+        return after, Wrench(upright.thrust, upright.torque_B * held + relaxed_B * given_up)
