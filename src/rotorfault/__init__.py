@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
     from rotorfault.analysis.null_space import NullSpace, null_space
+    from rotorfault.analysis.relaxed_hover import RelaxedHover, relaxed_hover
     from rotorfault.analysis.signatures import told_apart
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
@@ -120,6 +121,7 @@ _HOME = {
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
     "ReferenceWarning": "base.errors",
+    "RelaxedHover": "analysis.relaxed_hover",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "Wrench": "model.signals",
@@ -146,6 +148,7 @@ _HOME = {
     "neighbour": "scenario.neighbours",
     "null_space": "analysis.null_space",
     "register": "model.slot",
+    "relaxed_hover": "analysis.relaxed_hover",
     "repeat": "flight.fly",
     "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
@@ -200,6 +203,7 @@ __all__ = [
     "ReferenceSource",
     "ReferenceTable",
     "ReferenceWarning",
+    "RelaxedHover",
     "Response",
     "ResponseInputs",
     "Scenario",
@@ -238,6 +242,7 @@ __all__ = [
     "neighbour",
     "null_space",
     "register",
+    "relaxed_hover",
     "repeat",
     "scenario_names",
     "told_apart",

@@ -24,12 +24,12 @@ from rotorfault.analysis.poles import distinct_poles, pole_text
 from rotorfault.analysis.reach import reach_lines
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
 from rotorfault.analysis.signatures import Signatures, signature_lines, told_apart
+from rotorfault.analysis.vehicle_settings import vehicle_with
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.bounds import positive, require
-from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut, record_line
@@ -42,7 +42,7 @@ from rotorfault.model.signals import Wrench
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
-from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import named_places, substeps_of
@@ -207,12 +207,8 @@ def trim_report(
     if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
         raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
     mine, its = _shared_out(settings, isinstance(controller, str), not isinstance(vehicle, Vehicle))
-    if isinstance(vehicle, (str, Path)):
-        vehicle = load_vehicle(vehicle)
-    if isinstance(vehicle, VehicleFile) and its:
-        tables: dict[str, Any] = {"vehicle": vehicle.model_dump(mode="json")}
-        override_all(tables, its)
-        vehicle = validate(VehicleFile, tables["vehicle"], f"vehicle '{vehicle.name}' with its settings")
+    if not isinstance(vehicle, Vehicle):
+        vehicle = vehicle_with(vehicle, its)
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
     if isinstance(controller, str):
         named: dict[str, Any] = {"controller": {"kind": controller} | ({} if preset is None else {"preset": preset})}

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.motion import angular_acceleration, drag_acceleration
+from rotorfault.model.motion import angular_acceleration, drag_acceleration, torque_of_turning
 from rotorfault.model.signals import Motion, Stuck, following
 from rotorfault.model.vehicle import Vehicle, lateral_force, residual_speed, turn_against_rotors, wrench_of
 
@@ -67,7 +67,10 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
         forward_W, left_W = ((a + b) * 0.5 for a, b in zip(before.level_W, now.level_W, strict=True))
         lateral_B = lateral_force(vehicle, thrust)
         acceleration_W = acceleration_W + (forward_W * lateral_B.x + left_W * lateral_B.y) / vehicle.mass
-    turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
+    torque_B = (
+        wrench.torque_B if vehicle.air == () else wrench.torque_B + torque_of_turning(vehicle, omega_B, e.speed)
+    )
+    turn = angular_acceleration(vehicle, torque_B, omega_B, e.residual_speed)
     return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle, stuck.rotor))
 
 

@@ -152,6 +152,7 @@ class ClosedLoop:
             faulty=tuple(fault.rotor for fault in self.plant.faults),
             signals=self.layout.signals,
             rotors=rotors,
+            upside_down=self.plant.model.upside_down,
         )
 
     def __getitem__(self, slot: Slot[B]) -> B:

@@ -124,6 +124,7 @@ class Scores(NamedTuple):
     touched: Scalar  # 1 from the touch-down on
     gentle: Scalar  # whether the last instant was gentle enough for a touch-down
     rest: Scalar  # s at rest with rotors stopped
+    inverted: Scalar | tuple[()]  # s: for how long the tilt has been beyond 90 degrees; empty where it may not be
     detections: tuple[Detection, ...]  # one for each rotor that a fault hits, in the order of their numbers
     landing: Landing | tuple[()]  # where a landing may happen
     signals: Any  # record of what is counted of signals, by name

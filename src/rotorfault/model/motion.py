@@ -9,10 +9,11 @@ The paper gives no force law for its wind of fixed velocity; linear drag is the 
 
 from __future__ import annotations
 
-from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor
+from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor, zeros
 from rotorfault.maths.scalar import Scalar, clip, exp, less, select
+from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.signals import Stuck
-from rotorfault.model.vehicle import Vehicle, body_momentum, gyroscopic_torque, over_inertia
+from rotorfault.model.vehicle import Vehicle, body_momentum, gyroscopic_torque, over_inertia, rotor_places
 
 
 def drag_acceleration(vehicle: Vehicle, airspeed_W: Vec3) -> Vec3:
@@ -43,6 +44,23 @@ def torque_of_motion(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar | V
     """
     spin = omega_B.cross(body_momentum(vehicle, omega_B))
     return gyroscopic_torque(vehicle, omega_B, residual_speed) - spin
+
+
+def torque_of_turning(vehicle: Vehicle, omega_B: Vec3, speeds: PerRotor) -> Vec3:
+    """What the air does against the turning of a body that goes nowhere, in N m; 0 where a vehicle has no air.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    omega_B : Vec3, rad/s
+        Body rates.
+    speeds : PerRotor, rad/s
+        Of the rotors.
+    """
+    if vehicle.air == ():
+        return zeros()
+    assert isinstance(vehicle.air, Aerodynamics)
+    return air_wrench(vehicle.air, rotor_places(vehicle), speeds, zeros(), omega_B)[1]
 
 
 def angular_acceleration(vehicle: Vehicle, torque_B: Vec3, omega_B: Vec3, residual_speed: Scalar | Vec3) -> Vec3:

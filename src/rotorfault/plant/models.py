@@ -9,7 +9,7 @@ models differ in their kinematics.
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar
@@ -26,7 +26,15 @@ __all__ = ["PLANT", "BodyModel", "about_z", "acceleration", "angular_acceleratio
 
 
 class BodyModel(Block[State, BodyT, BodyT, Nothing]):
-    """Motion of the body under a wrench: a state record and its derivative, which the plant integrates."""
+    """Motion of the body under a wrench: a state record and its derivative, which the plant integrates.
+
+    Attributes
+    ----------
+    upside_down : float
+        For how long in s it may be tilted beyond 90 degrees and still fly on; 0 for a model that is wrong there.
+    """
+
+    upside_down: ClassVar[float] = 0.0
 
     def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> BodyT:
         """State record for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and rates [rad/s]."""

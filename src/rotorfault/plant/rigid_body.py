@@ -8,7 +8,7 @@ are told apart.
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
@@ -34,6 +34,10 @@ class RigidBodyState(NamedTuple):
 @register("rigid_body")
 class RigidBody(BodyModel[RigidBodyState]):
     """Rigid body on SO(3): quaternion attitude, valid at any angle."""
+
+    # Our choice. A vehicle that loses a rotor may roll over once and fly on; one that stays upside down for longer
+    # has fallen by more than a metre, its thrust pushing it down.
+    upside_down: ClassVar[float] = 0.5
 
     def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> RigidBodyState:
         """State for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and body rates [rad/s]."""

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from pydantic import Field, field_validator
 
 from rotorfault.autopilot.control.protocol import Law, LawMemory, LawOutput, RiccatiSignals, TrackingError
+from rotorfault.autopilot.control.relaxed import SpinWeights
 from rotorfault.autopilot.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain
 from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Mat3, Vec3
@@ -80,6 +81,13 @@ def sdre_parameters(weights: Weights) -> SdreParameters:
         Vec3.of(weights.error_floor),
         Vec3.of(weights.error_cap),
     )
+
+
+def spin_weights(parameters: SdreParameters) -> SpinWeights:
+    """Weights of roll and pitch, their means."""
+    q, qd, r = parameters.attitude_q_angle, parameters.attitude_q_rate, parameters.attitude_r
+    both = r.x + r.y
+    return SpinWeights((q.x + q.y) / both, (qd.x + qd.y) / both)
 
 
 def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar | Vec3) -> Mat3:
@@ -167,6 +175,10 @@ class Sdre(Law[SdreParameters]):
     def initial(self, position: TrackingError, attitude: TrackingError, parameters: SdreParameters) -> LawMemory:
         """Start from the guaranteed gain."""
         return LawMemory(position=Nothing(), attitude=initial_gain(attitude.drift, parameters))
+
+    def spin_weights(self, parameters: SdreParameters) -> SpinWeights:
+        """Of roll and pitch, their means."""
+        return spin_weights(parameters)
 
     def position(
         self, memory: Nothing, error: TrackingError, parameters: SdreParameters, dt: Scalar

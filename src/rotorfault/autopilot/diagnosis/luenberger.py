@@ -61,7 +61,14 @@ from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import nominal_inverse
-from rotorfault.model.motion import drag_acceleration, greatest_thrust, mean_bandwidth, mean_of, torque_of_motion
+from rotorfault.model.motion import (
+    drag_acceleration,
+    greatest_thrust,
+    mean_bandwidth,
+    mean_of,
+    torque_of_motion,
+    torque_of_turning,
+)
 from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
@@ -265,6 +272,8 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         climb = 0.5 * (before.v_W.z + now.v_W.z)
         omega_B = (before.omega_B + now.omega_B) * 0.5
         turning = torque_of_motion(vehicle, omega_B, expectation.residual_speed)
+        if vehicle.air != ():
+            turning = turning + torque_of_turning(vehicle, omega_B, expectation.speed)
         return (
             cosine,
             cosine * lift - vehicle.gravity + drag_acceleration(vehicle, Vec3(0.0, 0.0, -climb)).z,

@@ -36,7 +36,7 @@ MEANINGS = {
     "drifted": f"flew to its end, but more than {grades.BOUNDED:g} m off",
     "crashed": f"hit the ground faster than {grades.DESCENT:g} m/s, or tilted by more than "
     f"{np.degrees(grades.UPRIGHT):.0f} degrees",
-    "lost": "tumbled, tilted beyond 90 degrees in the air, or diverged: a state is not finite or 10 km away",
+    "lost": "tumbled, upside down in the air for half a second, or diverged: a state not finite or 10 km away",
 }
 
 
