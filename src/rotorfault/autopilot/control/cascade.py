@@ -212,13 +212,19 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         w0 = mean_bandwidth(vehicle)
         R_WB = estimate.q_WB.matrix()
 
+        spinning = None
+        available = inputs.thrust_available
+        if memory.relaxed != ():
+            relaxed = cast("RelaxedMemory", memory.relaxed), cast("RelaxedParameters", parameters.relaxed)
+            spinning = Spinning(*relaxed, inputs, dt)
+            available = spinning.available
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
         position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
         wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
-        force_W = limited_force(wanted, inputs.thrust_available, vehicle, parameters)
+        force_W = limited_force(wanted, available, vehicle, parameters)
 
         # Thrust axis and heading, and how far the body is from them.
         if six_inputs:
@@ -228,12 +234,9 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             axis_W, direct = force_W, zeros()
             given = outer.u + force_W - wanted
         bandwidth = parameters.filter_bandwidth
-        if memory.relaxed == ():
+        if spinning is None:
             turn = self.tracking.track(memory.reference, estimate, R_WB, axis_W, reference, bandwidth, dt)
-            spinning = None
         else:
-            relaxed = cast("RelaxedMemory", memory.relaxed), cast("RelaxedParameters", parameters.relaxed)
-            spinning = Spinning(*relaxed, inputs, dt)
             turn = spinning.track(self.tracking, memory.reference, R_WB, axis_W, bandwidth)
 
         # Attitude loop: torque.

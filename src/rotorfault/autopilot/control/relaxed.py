@@ -54,6 +54,7 @@ from rotorfault.model.vehicle import Vehicle, body_momentum, over_inertia, rotor
 YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that holds yaw loses a metre in two seconds
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 RIDGE = 1e-6  # relative
+MOST = 10.0  # of the weight: more thrust than is ever asked for
 
 
 class RelaxedSettings(Strict):
@@ -96,6 +97,7 @@ class RelaxedAxis(NamedTuple):
 
     memory: RelaxedMemory
     given_up: Scalar  # 0 to 1: share of yaw
+    thrust: Scalar  # N: most that the believed rotors give together in the balance of the axis
     to_B: Mat3  # from the frame with n for its z axis to the body's
     turn: Quat  # the same
 
@@ -154,7 +156,14 @@ def relaxed_axis(
     weight = vehicle.mass * vehicle.gravity
     given_up = clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
     able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
-    tau = _wanted_torque(vehicle, able, parameters.reserve)
+    balance = _balanced_thrust(vehicle, able, parameters.reserve)
+
+    def room(most: Scalar, thrust: Scalar) -> Scalar:
+        # A dead rotor bounds nothing.
+        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
+
+    most = able.map(room, balance).reduce(minimum) * weight
+    tau = wrench_of(vehicle, balance).torque_B
     wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
@@ -170,11 +179,12 @@ def relaxed_axis(
         -x * y * k, 1.0 - y * y * k, y,
         -x, -y, z,
     )  # fmt: skip
-    return RelaxedAxis(memory._replace(lean=lean), given_up, to_B, Quat(w, -y * half, x * half, 0.0))
+    turn = Quat(w, -y * half, x * half, 0.0)
+    return RelaxedAxis(memory._replace(lean=lean), given_up, most, to_B, turn)
 
 
-def _wanted_torque(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> Vec3:
-    """Torque of the believed rotors in N m when they carry the weight and each living one keeps a reserve."""
+def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:
+    """Thrusts in N with which the believed rotors carry the weight, each living one with its reserve."""
     weight = vehicle.mass * vehicle.gravity
     # Where nothing lives the sum is 0; the floor keeps the quotient a number.
     most = able.sum() if vehicle.tilt == () else able.dot(effectiveness(vehicle).thrust)
@@ -183,7 +193,8 @@ def _wanted_torque(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> Vec3:
     short, room = alike * reserve - level, alike - level
     share = short.map(lambda lacks, r: select(greater(lacks, 0.0), lacks / maximum(r, 1e-9 * weight), 0.0), room)
     push = minimum(share.reduce(maximum), 1.0)
-    return wrench_of(vehicle, level + room * push).torque_B
+    balance: PerRotor = level + room * push
+    return balance
 
 
 def _thrusts_for(vehicle: Vehicle, able: PerRotor, wrench: Wrench) -> PerRotor:

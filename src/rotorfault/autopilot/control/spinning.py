@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import final
 
+from rotorfault.autopilot.allocation.available import HOVER_RESERVE
 from rotorfault.autopilot.control.attitude import AttitudeReference, AttitudeTracking, Wanted
 from rotorfault.autopilot.control.protocol import ControlInputs
 from rotorfault.autopilot.control.relaxed import (
@@ -51,6 +52,13 @@ class Spinning:
             dt,
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
+
+    @property
+    def available(self) -> Scalar:
+        """Largest thrust in N that position control should ask for: that in balance, level or about the axis."""
+        inputs = self.inputs
+        most = minimum(self.axis.thrust, HOVER_RESERVE * inputs.vehicle.mass * inputs.vehicle.gravity)
+        return maximum(inputs.thrust_available, most * self.axis.given_up)
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
