@@ -40,6 +40,7 @@ CHILDREN: dict[str, list[str]] = {
         "diagnosis",
         "allocation",
         "attainable",
+        "total-loss",
         "frames",
         "riccati",
         "explanations/fair-comparison",

@@ -124,7 +124,9 @@ def relaxed_lines(hover: RelaxedHover, vehicle: Vehicle) -> list[str]:
     if not hover.possible:
         return [f"Relaxed hover, {gone}: not possible; {hover.why}"]
     turning = math.isfinite(hover.period)
-    rates = ", ".join(f"{float(rate):.3g}" for rate in hover.omega_B)
+    # What the search leaves of a rate that is none is not printed.
+    size = 1e-4 * float(hover.omega_B.norm())
+    rates = ", ".join(f"{rate:.3g}" if abs(rate) > size else "0" for rate in map(float, hover.omega_B))
     rows = [
         ("thrusts [N]", ", ".join(f"{number}: {float(f):.4g}" for number, f in enumerate(hover.thrust, start=1))),
         ("least thrust of a living rotor", f"{hover.reserve:.3g} of their mean"),

@@ -16,11 +16,14 @@ from rotorfault.autopilot.control.relaxed import (
     relaxed_torque,
 )
 from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
 from rotorfault.model.signals import Wrench
 
 # Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
 LEAST_THRUST = 0.3
+# Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
+# rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
+FASTEST = 10.0
 
 
 @final
@@ -103,5 +106,7 @@ class Spinning:
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
         relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
+        beyond = absolute(self.omega.z) / (FASTEST * inputs.vehicle.rotor_bandwidth)
+        given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         held = 1.0 - given_up
         return after, Wrench(upright.thrust, upright.torque_B * held + relaxed_B * given_up)
