@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv paper ranges test test-long test-numpy test-bounds web fuzz lint types bench peers maps benchmarks docs \
+.PHONY: help venv paper ranges test test-long test-numpy test-bounds web fuzz lint types bench peers maps frame-maps benchmarks docs \
   docs-long clean check-python
 
 help: ## List the targets
@@ -119,6 +119,9 @@ docs-long: .venv/.stamp-develop ## Run the code of all pages as it stands, with 
 maps: .venv/.stamp-fly ## Fly the built-in survival campaigns
 	for study in partial-loss-map two-rotors detection-worth mass-inertia; do \
 	  .venv/$(BIN)/rotorfault campaign $$study --out results/campaigns/$$study || exit 1; done
+
+frame-maps: .venv/.stamp-develop ## Fly what frames of six and eight rotors can lose (20 min on 2 cores; resumed if interrupted)
+	.venv/$(BIN)/python tools/frame_maps.py
 
 benchmarks: .venv/.stamp-develop ## Run every script in benchmarks/
 	@for script in benchmarks/*.py; do \

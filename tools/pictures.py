@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from frame_picture import frame_losses
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -105,15 +106,44 @@ def _key(made: Figure) -> None:
 
 
 def motors_built_in() -> Figure:
-    """Orders of the vehicles that come with rotorfault."""
-    made = figure(6.6)
-    titles = {"paper": "paper, and its variants", "hummingbird": "hummingbird", "crazyflie-2.1": "crazyflie-2.1"}
-    for place, (name, title) in enumerate(titles.items()):
+    """Orders of the vehicles that come with rotorfault, one picture for those that count and turn alike."""
+    alike: dict[object, list[str]] = {}
+    for name in rf.vehicle_names():
         vehicle = rf.load_vehicle(name).vehicle
-        places = [(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)]
-        motors(places, [s > 0 for s in vehicle.rotor_yaw_sign], title, made.add_subplot(1, 3, place + 1))
+        corners = [
+            (round(math.atan2(float(y), float(x)) / math.radians(30.0)), float(sign))
+            for x, y, sign in zip(vehicle.rotor_x, vehicle.rotor_y, vehicle.rotor_yaw_sign, strict=True)
+        ]
+        alike.setdefault(tuple(corners), []).append(name)
+    order = sorted(alike.values(), key=lambda names: (len(rf.load_vehicle(names[0]).rotor), "paper" not in names))
+    columns = 5
+    rows = math.ceil(len(order) / columns)
+    made = figure(3.9 * rows + 0.9)
+    made.get_layout_engine().set(rect=(0.0, 0.05, 1.0, 0.95))  # type: ignore[union-attr]
+    for at, names in enumerate(order):
+        vehicle = rf.load_vehicle(names[0]).vehicle
+        places = _one_out([(float(x), float(y)) for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)])
+        coaxial = len({round(math.atan2(y, x), 6) for x, y in places}) < len(places)
+        size = 0.62 if coaxial or len(places) > 6 else 0.8 if len(places) > 4 else 0.9
+        shown = [name for name in names if not name.startswith("paper-")]
+        title = "\n".join(", ".join(shown[k : k + 2]) for k in range(0, len(shown), 2))
+        axes = made.add_subplot(rows, columns, at + 1)
+        motors(places, [sign > 0 for sign in vehicle.rotor_yaw_sign], title, axes, size)
+        axes.title.set_fontsize(7.5)
     _key(made)
+    made.text(0.98, 0.02, "▲ forward", ha="right", fontsize=8.0)
     return made
+
+
+def _one_out(places: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The same places, of two motors on an arm the second one farther out."""
+    seen: set[tuple[float, float]] = set()
+    found = []
+    for x, y in places:
+        out = 1.8 if (round(x, 6), round(y, 6)) in seen else 1.0
+        seen.add((round(x, 6), round(y, 6)))
+        found.append((out * x, out * y))
+    return found
 
 
 def motors_autopilots() -> Figure:
@@ -283,6 +313,7 @@ PICTURES: dict[str, Callable[[], Figure | bytes]] = {
     "motors-built-in.png": motors_built_in,
     "motors-autopilots.png": motors_autopilots,
     "frames.png": frames,
+    "frame-losses.png": frame_losses,
     "data-flow.png": data_flow,
     "gallery-rotors.png": plotted("rotors", CASE),
     "gallery-detection.png": plotted("fault_detection", "hover-fault"),

@@ -19,11 +19,11 @@ from typing import Any
 
 from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
 from rotorfault.autopilot.control.cascade import CascadeSettings
-from rotorfault.loop.recorded import GroundSignals, LandingSignals, LoopSignals
+from rotorfault.loop.recorded import BatterySignals, GroundSignals, LandingSignals, LoopSignals, TiltSignals
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.frames import FRAMES
-from rotorfault.model.quantities import AirFile, Rotor
+from rotorfault.model.quantities import AirFile, BatteryFile, Rotor
 from rotorfault.model.slot import Slot, telemetry_of
 from rotorfault.model.telemetry import RPY, Signal, signals_of
 from rotorfault.model.vehicle import Opposite
@@ -95,9 +95,12 @@ def _vehicle_table() -> str:
     units = {key: quantity.unit for key, quantity in load_vehicle("paper").quantities()}
     rows = []
     for name, field in VehicleFile.model_fields.items():
-        if name in ("rotor", "air"):
+        if name in ("rotor", "air", "battery"):
             continue
         unit = units.get(name, "")
+        if not field.is_required() and field.default is None:
+            rows.append([f"`{name}`", "not given", *_unit_and_text(field.description or "")])
+            continue
         # Of a quantity the number alone, in the unit beside it.
         default = "required" if field.is_required() else toml_value(getattr(field.default, "value", field.default))
         rows.append([f"`{name}`", default, unit, _without_unit(field.description or "", unit)])
@@ -108,12 +111,20 @@ def _vehicle_table() -> str:
         default = "required" if field.is_required() else toml_value(field.default)
         text = (field.description or "").removesuffix(f", {unit}")
         rows.append([f"`rotor.{name}`", default, unit, text])
+    for name, field in BatteryFile.model_fields.items():
+        rows.append([f"`battery.{name}`", "required in it", *_unit_and_text(field.description or "")])
     for name, field in AirFile.model_fields.items():
         unit, _, text = (field.description or "").partition(", ")
         # "the same for yaw" is in the unit of the row before it.
         unit, text = (unit, text) if any(unit == one for one in AIR_UNITS) else (rows[-1][2], field.description or "")
         rows.append([f"`air.{name}`", "0", unit, text])
     return _markdown(["key", "default", "unit", "meaning"], rows)
+
+
+def _unit_and_text(text: str) -> list[str]:
+    """Unit and meaning of a description that begins with the unit, if it has one."""
+    unit, _, meaning = text.partition(", ")
+    return [unit, meaning] if unit in ("1", "m", "rad/s", "kg m^2", "A s", "ohm", "F", "W") else ["", text]
 
 
 def _without_unit(text: str, unit: str) -> str:
@@ -124,6 +135,8 @@ def _without_unit(text: str, unit: str) -> str:
 def _loop_signals_table() -> str:
     """What the loop records of itself."""
     recorded = {LoopSignals: "always", GroundSignals: "with `ground`", LandingSignals: "with `on_fault` = `land`"}
+    recorded[TiltSignals] = "with tilted rotors"
+    recorded[BatterySignals] = "with `start.charge`"
     rows = [_signal_row(signal, when) for kind, when in recorded.items() for signal in signals_of(kind)]
     return _markdown(["signal", "over time and", "unit", "frame", "recorded", "meaning"], rows)
 

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
         critical_thrust_to_weight,
     )
     from rotorfault.analysis.hover import critical_loss, critical_pair, hover_margin, torque_reserve
+    from rotorfault.analysis.null_space import NullSpace, null_space
+    from rotorfault.analysis.relaxed_hover import RelaxedHover, relaxed_hover
+    from rotorfault.analysis.signatures import told_apart
     from rotorfault.analysis.trim import trim_report
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
     from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
@@ -96,6 +99,7 @@ _HOME = {
     "InputError": "base.errors",
     "Mat3": "maths.geometry",
     "Nothing": "model.block",
+    "NullSpace": "analysis.null_space",
     "OneRotor": "plant.faults",
     "PerRotor": "maths.geometry",
     "Quantity": "model.telemetry",
@@ -117,6 +121,7 @@ _HOME = {
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
     "ReferenceWarning": "base.errors",
+    "RelaxedHover": "analysis.relaxed_hover",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "Wrench": "model.signals",
@@ -141,10 +146,13 @@ _HOME = {
     "load_scenario": "scenario.library",
     "load_vehicle": "model.vehicle_file",
     "neighbour": "scenario.neighbours",
+    "null_space": "analysis.null_space",
     "register": "model.slot",
+    "relaxed_hover": "analysis.relaxed_hover",
     "repeat": "flight.fly",
     "scenario_names": "scenario.library",
     "torque_reserve": "analysis.hover",
+    "told_apart": "analysis.signatures",
     "trim_report": "analysis.trim",
     "tune": "tuning.search",
     "vehicle_names": "model.vehicle_file",
@@ -184,6 +192,7 @@ __all__ = [
     "InputError",
     "Mat3",
     "Nothing",
+    "NullSpace",
     "OneRotor",
     "PerRotor",
     "Quantity",
@@ -194,6 +203,7 @@ __all__ = [
     "ReferenceSource",
     "ReferenceTable",
     "ReferenceWarning",
+    "RelaxedHover",
     "Response",
     "ResponseInputs",
     "Scenario",
@@ -230,9 +240,12 @@ __all__ = [
     "load_scenario",
     "load_vehicle",
     "neighbour",
+    "null_space",
     "register",
+    "relaxed_hover",
     "repeat",
     "scenario_names",
+    "told_apart",
     "torque_reserve",
     "trim_report",
     "tune",

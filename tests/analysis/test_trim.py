@@ -204,6 +204,8 @@ def test_trim_warns_of_a_vehicle_by_its_numbers_alone(name: str) -> None:
         rotor_y=PerRotor(y, -y, -y, y),
         rotor_yaw_sign=PerRotor(1.0, 1.0, -1.0, -1.0),
         pairs=Opposite((0, 1, 2, 3)),
+        tilt=(),
+        rotor_z=(),
     )
     (line,) = [line for line in trim_report(thin, "smc").warnings if line.startswith("roll: hover leaves")]
     assert f"{hover(thin).torque_max.x / thin.inertia.x:.3g} rad/s^2 (lever {1e3 * y:.3g} mm" in line

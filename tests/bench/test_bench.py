@@ -83,6 +83,11 @@ def test_bench_measures_everything_and_says_it(everything: dict[str, Any], tmp_p
         steps, simulated = rows[f"batch of {int(size):,}"][:2]
         assert steps == f"{1e-6 * part['steps_per_s']:.2f} M"
         assert number(simulated) == pytest.approx(part["simulated_s_per_s_per_core"], abs=0.51)
+    assert set(saved["frames"]) == {"4", "6", "8"}
+    for rotors, part in saved["frames"].items():
+        shown = rows[f"{rotors} rotors, {part['vehicle']}"]
+        assert shown[0] == f"{1e-6 * part['steps_per_s']:.2f} M"
+        assert number(shown[2]) == pytest.approx(part["cost_factor"], abs=0.0051)
     for engine, part in saved["latency"].items():
         assert [number(cell) for cell in rows[engine]] == pytest.approx(
             [part["median_us"], part["p99_9_us"]], abs=0.05

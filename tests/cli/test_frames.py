@@ -125,7 +125,7 @@ def test_cases_are_written_as_json(tmp_path: Path) -> None:
     rows = json.loads(path.read_text(encoding="utf-8"))
     assert len(rows) == 2 * (6 + 4)
     for row in rows:
-        assert list(row) == ["frame", "failed", "channels", "acai", "critical_thrust_to_weight"]
+        assert list(row) == ["frame", "failed", "channels", "acai", "critical_thrust_to_weight", "flown"]
         assert row["acai"] == rf.acai(row["frame"], row["failed"], row["channels"]).acai
         ratio = rf.critical_thrust_to_weight(row["frame"], row["failed"], row["channels"])
         assert row["critical_thrust_to_weight"] == (pytest.approx(ratio) if ratio < 1e9 else None)

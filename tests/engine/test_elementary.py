@@ -39,6 +39,7 @@ CASES: tuple[tuple[str, tuple[np.ndarray, ...], float], ...] = (
     ("cos", (around(1e-3, 10.0, 1e6, 1e12),), 3.0),
     ("tan", (around(1e-3, 10.0, 1e6),), 4.0),
     ("exp", (around(1e-3, 1.0, 700.0),), 2.0),
+    ("log", (np.abs(around(1e-3, 2.0, 1e300)),), 3.0),
     ("asin", (around(1e-3, 1.0),), 4.0),
     ("tanh", (around(1e-3, 0.2, 20.0),), 5.0),
     ("sqrt", (np.abs(around(1.0, 1e300)),), 0.0),
@@ -79,6 +80,13 @@ def test_edges_of_one_argument(name: str) -> None:
     with np.errstate(all="ignore"):
         wanted = NUMPY.get(name, getattr(np, name, None))(x)
     np.testing.assert_allclose(evaluate(getattr(scalar, name), x), wanted, rtol=3e-16, atol=0.0)
+
+
+def test_a_logarithm_is_that_of_a_positive_number() -> None:
+    x = np.array([math.inf, 1.0, 2.0**-1022, 0.0, -0.0, -1.0, -math.inf, math.nan])
+    found = evaluate(scalar.log, x)
+    np.testing.assert_allclose(found[:3], [math.inf, 0.0, -1022.0 * math.log(2.0)], rtol=3e-16)
+    assert np.isnan(found[3:]).all()
 
 
 @pytest.mark.parametrize("name", ["sin", "cos", "tan"])

@@ -35,7 +35,7 @@ SCENARIOS: dict[str, dict[str, Any]] = {
     "faulty": {"fault": [FAULT, {**FAULT, "rotor": 3, "time": 0.4}], "sensors": "noisy", "wind": "dryden"},
     "moving": {"reference": {"kind": "sinusoid", "amplitude": [0.5, 0.5, 0.2], "frequency": [1.0, 1.0, 2.0]}},
     # Ends between two of the seldom records.
-    "lost": {"fault": [{"kind": "total", "rotor": 1, "time": 0.1}], "diagnosis": "off"},
+    "lost": {"fault": [{"kind": "total", "rotor": 1, "time": 0.1}], "diagnosis": "off", "plant": "paper_model"},
     "landed": {
         "fault": [{**FAULT, "time": 0.05}],
         "ground": 0.0,

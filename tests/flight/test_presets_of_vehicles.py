@@ -21,6 +21,9 @@ PRESETS = {
     "paper-arm-0225": "quiet",
     "paper-iz-33e-4": "quiet",
 }
+# `midsize` is no vehicle's own: these were in its search, and those were not.
+SEARCHED_WITH = ("x500", "f550", "du-ppnnpn", "x8")
+KEPT_ASIDE = ("minnie", "hitsz", "racer-5inch", "deadcat", "uzh-2020", "du-pnpnpn", "y6", "octa-x")
 SEEDS = (500, 501, 502, 503)  # none that a search has seen
 
 
@@ -70,3 +73,35 @@ def test_a_noisy_hover_does_not_rattle(vehicle: str, law: str) -> None:
             flight = rf.fly("hover-fault", settings=sound)
             assert flight.outcome.kind == "settled"
             assert flight.scores["command_step"] < RATTLING
+
+
+def midsize(vehicle: str, law: str) -> dict[str, object]:
+    return {"vehicle": vehicle, "controller.kind": law, "controller.preset": "midsize"}
+
+
+@pytest.mark.parametrize("law", ["roismc", "smc"])
+def test_midsize_has_the_usual_margins_on_every_vehicle_of_its_rotors(law: str) -> None:
+    """Those that it was not made from as well: their inertia, arms and numbers of rotors are not in the gains."""
+    assert record(law, "midsize")["vehicle"] == ", ".join(SEARCHED_WITH)
+    for vehicle in (*SEARCHED_WITH, *KEPT_ASIDE):
+        assert rf.trim_report(vehicle, law, "midsize").warnings == ()
+        kinds = {doubt.kind for doubt in doubts(load_scenario("hover-fault", midsize(vehicle, law)))}
+        assert rf.ControllerWarning not in kinds
+
+
+@needs_simd
+@pytest.mark.parametrize("law", ["roismc", "smc"])
+@pytest.mark.parametrize("vehicle", [*KEPT_ASIDE, "x500"])
+def test_midsize_flies_what_it_was_not_made_from(vehicle: str, law: str) -> None:
+    own = {**midsize(vehicle, law), "duration": 8.0}
+    sound = rf.fly("hover-fault", settings={**own, "fault": [], "duration": 3.0})
+    assert sound.outcome.kind == "settled"
+    assert sound.scores["command_step"] < RATTLING
+    fault = [{"kind": "step", "rotor": 1, "time": 2.0, "loss": 0.3}]
+    flights = rf.fly_many(
+        "paper-set-point", {"seed": SEEDS, "wind.velocity_W.0": (-3.0, -1.0, 1.0, 3.0)},
+        settings={**own, "plant": "rigid_body", "fault": fault, "sensors": "noisy"}, warn=False,
+    )  # fmt: skip
+    assert flights.table["survived"].all()
+    for axis in "xyz":
+        assert abs(flights.table[f"position_error_end.{axis}"]).max() < RECOVERED

@@ -89,7 +89,7 @@ def test_a_fault_that_would_begin_after_the_end_is_none() -> None:
     assert [one["true_time"] for one in detections(fault=late, duration=0.305)] == [0.3]
     # Nor one that comes when the flight is lost already.
     fault = [{"kind": "total", "rotor": 2, "time": 0.05}, {"kind": "step", "rotor": 1, "time": 0.9, "loss": 0.2}]
-    flight = rotorfault.fly(short(fault=fault, diagnosis="off", duration=1.5), engine=FASTEST)
+    flight = rotorfault.fly(short(fault=fault, diagnosis="off", duration=1.5, plant="paper_model"), engine=FASTEST)
     assert flight.outcome.kind == "tumbled"
     assert flight.outcome.time < 0.9
     assert [one["rotor"] for one in flight.summary()["detections"]] == [2]

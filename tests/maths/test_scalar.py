@@ -14,8 +14,8 @@ from rotorfault.maths import scalar
 NAN, INF = math.nan, math.inf
 
 ONE = (
-    "sqrt", "reciprocal", "exp", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate", "nearest",
-    "wrap_angle",
+    "sqrt", "reciprocal", "exp", "log", "sin", "cos", "tan", "asin", "tanh", "absolute", "sign", "saturate",
+    "nearest", "wrap_angle",
 )  # fmt: skip
 TWO = ("atan2", "minimum", "maximum")
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal")
@@ -26,6 +26,7 @@ EXPECTED: dict[str, Callable[..., float]] = {
     "sqrt": lambda x: math.sqrt(x) if x >= 0 else NAN,
     "reciprocal": lambda x: 1.0 / x if x != 0.0 else math.copysign(INF, x),
     "exp": math.exp,
+    "log": lambda x: math.log(x) if x > 0 else NAN,
     "sin": math.sin,
     "cos": math.cos,
     "tan": math.tan,

@@ -13,12 +13,14 @@ from hypothesis import strategies as st
 from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.quantities import BatteryFile
 from rotorfault.model.vehicle import Vehicle, gyroscopic_torque, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, new_vehicle, vehicle_names
 
 BUILT_IN = (
-    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hitsz", "hummingbird", "minnie", "mueller-2014",
-    "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8", "y6",
+    "crazyflie-2.1", "deadcat", "du-pnpnpn", "du-ppnnpn", "f550", "hexa-tilt30", "hitsz", "hummingbird", "minnie",
+    "mueller-2014", "octa-x", "paper", "paper-arm-0225", "paper-iz-33e-4", "racer-5inch", "uzh-2020", "x500", "x8",
+    "y6",
 )  # fmt: skip
 
 
@@ -32,7 +34,11 @@ def test_built_in_vehicles_are_complete(name: str) -> None:
     assert file.name == name
     assert file.description
     assert 1.5 < file.thrust_to_weight < 5.0
-    assert len(dict(file.quantities())) == 14 + 2 * len(file.rotor)
+    numbers = dict(file.quantities())
+    axes = sum(rotor.axis is not None for rotor in file.rotor)
+    some_have = {"rotor_radius", *(f"battery.{key}" for key in BatteryFile.model_fields)}
+    assert len(numbers.keys() - some_have) == 14 + 2 * len(file.rotor) + axes
+    assert not numbers.keys() & some_have or some_have <= numbers.keys()
     assert all(len(quantity.source) > 5 for _, quantity in file.quantities())
 
 
@@ -139,6 +145,7 @@ BAD = {
     "triangle": (changed("inertia_z = { value = 0.018", "inertia_z = { value = 0.0201"), "inertia_z", "sum.*0.02"),
     "too weak": (changed("thrust_max = { value = 5.5", "thrust_max = { value = 2.4"), "thrust_max", "0.979.*2.45"),
     "limits swapped": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 5.6"), "thrust_min", "less"),
+    "too far back": (changed("thrust_min = { value = 0.0", "thrust_min = { value = -6.0"), "thrust_min", "backwards"),
     "no descent": (changed("thrust_min = { value = 0.0", "thrust_min = { value = 2.46"), "thrust_min", "2.453 N"),
     "unknown key": (changed("mass =", "masss ="), "masss", "unknown key; did you mean 'mass'"),
     "missing key": (re.sub("^gravity = .*", "", GOOD, flags=re.M), "gravity", "missing"),

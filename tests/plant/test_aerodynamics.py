@@ -14,11 +14,12 @@ from plant_flights import fly, plant_of
 import rotorfault as rf
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.aerodynamics import Aerodynamics, air_wrench, still_air
+from rotorfault.model.vehicle import rotor_places
 from rotorfault.model.vehicle_file import load_vehicle
 
-VEHICLE = load_vehicle("hummingbird").vehicle
+VEHICLE = load_vehicle("hummingbird").vehicle._replace(rotor_z=PerRotor.all(0.02))
 HUMMINGBIRD = Aerodynamics(
-    PerRotor(0.02, 0.02, 0.02, 0.02), 1.19e-4, 2.32e-4, 3.39e-3, 1e-5, Vec3(0.5e-2, 0.5e-2, 1e-2),
+    1.19e-4, 2.32e-4, 3.39e-3, 1e-5, Vec3(0.5e-2, 0.5e-2, 1e-2),
     Vec3(1e-3, 1e-3, 2.75e-3), Vec3(0.0, 0.0, 1e-4),
 )  # fmt: skip
 number = st.floats(-8.0, 8.0)
@@ -26,7 +27,7 @@ speed = st.floats(0.0, 900.0)
 
 
 def wrench(air: Aerodynamics, speeds: PerRotor, v: Vec3, omega: Vec3) -> tuple[np.ndarray, np.ndarray]:
-    found = air_wrench(air, VEHICLE.rotor_x, VEHICLE.rotor_y, speeds, v, omega)
+    found = air_wrench(air, rotor_places(VEHICLE), speeds, v, omega)
     return tuple(np.array([*part], dtype=float) for part in found)  # type: ignore[return-value]
 
 
@@ -35,7 +36,7 @@ def test_it_is_the_wrench_of_rotorpy(x: tuple[float, ...]) -> None:
     """The equations of RotorPy's `Multirotor.compute_body_wrench`, in NumPy's words; damping is not in them."""
     v, omega, speeds = np.array(x[:3]), np.array(x[3:6]), np.array(x[6:])
     air = HUMMINGBIRD._replace(damping=zeros(), damping_squared=zeros())
-    places = np.array([[*VEHICLE.rotor_x], [*VEHICLE.rotor_y], [*air.rotor_z]])
+    places = np.array([[*place] for place in rotor_places(VEHICLE)]).T
     local = v[:, None] + np.cross(omega, places.T).T
     pull = -speeds * (np.diag([air.rotor_drag, air.rotor_drag, air.inflow]) @ local)
     pull[2] += air.translational_lift * (local[0] ** 2 + local[1] ** 2)
@@ -57,7 +58,7 @@ def test_drag_and_damping_never_give_energy(x: tuple[float, ...]) -> None:
 
 
 def test_nothing_is_nothing() -> None:
-    force, torque = wrench(still_air(4), PerRotor.all(500.0, 4), Vec3(3.0, -2.0, 1.0), Vec3(1.0, 2.0, 3.0))
+    force, torque = wrench(still_air(), PerRotor.all(500.0, 4), Vec3(3.0, -2.0, 1.0), Vec3(1.0, 2.0, 3.0))
     assert not force.any()
     assert not torque.any()
 
@@ -65,7 +66,7 @@ def test_nothing_is_nothing() -> None:
 def test_a_spinning_body_is_damped_to_where_torque_and_damping_balance() -> None:
     """tau = gamma r (Mueller and D'Andrea 2014): here with a yaw torque that two rotors leave over."""
     gamma = 2.75e-3
-    air = still_air(4)._replace(damping=Vec3(0.0, 0.0, gamma))
+    air = still_air()._replace(damping=Vec3(0.0, 0.0, gamma))
     vehicle = VEHICLE._replace(air=air, rotor_reaction=0.0)
     weight = vehicle.mass * vehicle.gravity
     thrust = PerRotor(0.26 * weight, 0.26 * weight, 0.24 * weight, 0.24 * weight)

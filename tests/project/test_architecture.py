@@ -41,7 +41,7 @@ LAZY = {
         "scipy": "is needed for frames without opposite pairs alone",
         "scipy.optimize": "the same",
     },
-    "rotorfault.model.vehicle_file": {"scipy.optimize": "is needed for frames without opposite pairs alone"},
+    "rotorfault.model.vehicle_rules": {"scipy.optimize": "is needed for frames without opposite pairs alone"},
     "rotorfault.campaigns.flight_set": {"scipy.stats": "takes longer to load than all else; most designs need none"},
     "rotorfault.base.frames": {
         "pandas": "need not be there, and takes long to load",
@@ -54,11 +54,16 @@ LAZY = {
         "rotorfault.campaigns.study": "the same",
         "rotorfault.flight.reference_rows": "the same",
         "rotorfault.flight.assembly": "is needed to check a scenario, and for no list",
+        "rotorfault.analysis.reach": "is needed to check a vehicle, and brings scipy",
         "rotorfault.results.dataset": "xarray takes longer to load than a file to check",
     },
     "rotorfault.cli.details": {
         "rotorfault.campaigns.axes": "is needed for studies and what they vary alone",
         "rotorfault.campaigns.study": "the same, and its statistics take long to load",
+    },
+    "rotorfault.bench.rotorpy_plant": {
+        "rotorpy.vehicles.hummingbird_params": OPTIONAL,
+        "rotorpy.vehicles.multirotor": OPTIONAL,
     },
     "rotorfault.engine": {
         "rotorfault.engine.arrays": "one engine flies, the others need not load",

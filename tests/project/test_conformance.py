@@ -24,7 +24,8 @@ from rotorfault.flight.check_block import check_block
 from rotorfault.flight.rules import float_settings, nudged
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.plant import GROUND, PLANT
-from rotorfault.scenario.scenario import Mismatch, Scenario, scenario_from
+from rotorfault.scenario.mismatch import Mismatch
+from rotorfault.scenario.scenario import Scenario, scenario_from
 from rotorfault.scenario.slots import SLOTS
 
 Array = NDArray[np.float64]
@@ -189,6 +190,7 @@ MISMATCHES: list[dict[str, Any]] = [
     {"rotor_bandwidth": 1.01},
     {"rotor_gain": 1.01},
     {"linear_drag": 1.01},
+    {"thrust_curve": 0.21},
 ]
 
 
@@ -196,6 +198,7 @@ MISMATCHES: list[dict[str, Any]] = [
 def test_the_numbers_of_a_plant_are_those_of_the_true_vehicle(name: str, tmp_path: Path) -> None:
     """Hence one compiled loop serves all vehicles; each number acts, and only on the truth."""
     tables = scenario(tmp_path, {PLANT.name: name}).as_tables()
+    tables["vehicle"]["thrust_curve"] = {"value": 0.2, "unit": "1", "source": "test"}
     with pytest.raises(InputError, match="plant"):
         scenario_from(tables | {PLANT.name: {"kind": name, "mass": 1.0}}, "test")
     assert {key for mismatch in MISMATCHES for key in mismatch} == set(Mismatch.model_fields)

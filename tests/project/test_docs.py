@@ -21,12 +21,15 @@ from places import DOCS, ROOT, SOURCE
 import rotorfault as rf
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.cascade import CascadeSettings
-from rotorfault.base.config import parse_toml
+from rotorfault.base.config import parse_toml, validate
 from rotorfault.campaigns.study import study_from
 from rotorfault.cli.catalogue import entries
 from rotorfault.cli.main import app
 from rotorfault.flight.fly import prepare
+from rotorfault.loop.recorded import TiltSignals
 from rotorfault.loop.scores import ENDS, SURVIVED
+from rotorfault.model.telemetry import signals_of
+from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.reference import REFERENCE
 from rotorfault.results.score_table import LANDING
 from rotorfault.scenario.overrides import parse_overrides
@@ -178,7 +181,7 @@ def test_signals_are_those_of_flights() -> None:
     rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
     seen = set()
     for kind in CONTROLLER.registry:
-        settings = {"duration": 0.002, "controller.kind": kind}
+        settings = {"duration": 0.002, "controller.kind": kind, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
         data = rf.fly("land-after-fault", settings=settings, engine="python").data
         for name, variable in data.data_vars.items():
             _, _, dims, unit, _, recorded, meaning, _ = rows[str(name)]
@@ -187,6 +190,7 @@ def test_signals_are_those_of_flights() -> None:
             if str(name).startswith("controller."):
                 assert recorded == "all" or f"`{kind}`" in recorded
             seen.add(str(name))
+    seen |= {signal.name for signal in signals_of(TiltSignals)}  # tests/flight/test_tilted_flight.py flies with them
     assert seen == {name for name in rows if name not in ("signal", "---")}
 
 
@@ -311,5 +315,7 @@ def test_scenarios_and_parts_in_toml_are_valid() -> None:
             study_from(tables, name_of(path))
         elif "duration" in tables:
             scenario_from(tables, name_of(path))
+        elif set(tables) <= set(VehicleFile.model_fields):
+            validate(VehicleFile, load_vehicle("paper").model_dump(mode="json") | tables, name_of(path))
         else:
             prepare("paper-set-point", settings=tables)

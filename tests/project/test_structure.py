@@ -157,7 +157,8 @@ def test_twins_are_seen_under_other_names() -> None:
         (r"^from llvmlite|^import llvmlite", {"engine/native.py"}),
         (r"multiprocessing|ProcessPoolExecutor", {"base/executors.py"}),
         (r"SeedSequence|default_rng|Philox\(", {"campaigns/flight_set.py", "scenario/neighbours.py",
-                                                "tuning/training.py", "bench/sdre.py", "bench/flights.py"}),
+                                                "tuning/training.py", "bench/sdre.py", "bench/flights.py",
+                                                    "bench/rotorpy_plant.py"}),
     ],
     ids=["flight.nc is written in one place", "the compiler", "processes", "random numbers"],
 )  # fmt: skip

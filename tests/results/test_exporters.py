@@ -19,6 +19,7 @@ import rotorfault as rf
 from rotorfault.base.errors import FileWarning
 from rotorfault.results import exporters
 from rotorfault.results.events import events
+from rotorfault.results.exporters.foxglove import along
 from rotorfault.results.flight_data import FlightData
 
 Values = NDArray[np.float64]
@@ -110,6 +111,14 @@ def test_mcap_has_what_foxglove_draws(flight: rf.Flight, tmp_path: Path) -> None
     up = Rotation.from_quat([turned[key] for key in "xyzw"]).apply([1.0, 0.0, 0.0])
     assert up == pytest.approx([0.0, 0.0, 1.0])
     assert [log["message"] for _, log in found["/events"]] == [event.text for event in events(flight.records())]
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (-0.433, 0.25, 0.866), (0.0, -0.6, -0.8), (-1.0, 0.0, 0.0)])
+@pytest.mark.parametrize("force", [2.0, -1.0])
+def test_arrows_of_thrust_lie_along_the_axes_of_tilted_rotors(axis: tuple[float, ...], force: float) -> None:
+    turned = along((axis[0], axis[1], axis[2]), force < 0.0)
+    found = Rotation.from_quat([turned[key] for key in "xyzw"]).apply([1.0, 0.0, 0.0])
+    assert found == pytest.approx(np.sign(force) * np.array(axis), abs=1e-3)
 
 
 def test_the_layout_for_foxglove_names_what_is_there(flight: rf.Flight, tmp_path: Path) -> None:

@@ -104,7 +104,9 @@ def test_losses_are_named_and_dated() -> None:
     assert scored(position=below)["outcome"] == "offset"
     # A tilt beyond 90 degrees, also where roll and pitch both turn over and the thrust axis points up again.
     over = steps((40, [1.5, 1.5, 0.0]), (61, [1.6, 0.0, 0.0]))
-    assert ending(attitude=over) == ("tumbled", pytest.approx(4.0))
+    assert ending(attitude=over) == ("tumbled", pytest.approx(4.4))  # at the fifth instant, of 0.1 s each
+    once = steps((40, [1.5, 1.5, 0.0]), (4, [1.6, 0.0, 0.0]), (57, [0.0, 0.0, 0.0]))
+    assert ending(attitude=once)[0] == "settled"
     assert ending(attitude=[math.pi, math.pi, 0.0], yaw_reference=math.pi)[0] == "settled"
     far = steps((20, [9e3, 0.0, 0.0]), (81, [1.1e4, 0.0, 0.0]))
     assert ending(position=far) == ("diverged", pytest.approx(2.0))
@@ -329,9 +331,9 @@ def test_excursion_and_altitude_lost_are_counted_from_the_fault_on() -> None:
 
 
 def test_nothing_is_counted_once_a_flight_is_over() -> None:
-    """Tumbled at 4 s; what comes after is another flight's business."""
+    """Tumbled at 4 s, upside down since 3.6 s; what comes after is another flight's business."""
     wild = steps((40, [0.0] * 3), (61, [5.0, 5.0, -5.0]))
-    row = scored(position=wild, attitude=steps((40, [0.0] * 3), (61, [3.0, 0.0, 0.0])), thrust_command=[4.0] * 4)
+    row = scored(position=wild, attitude=steps((36, [0.0] * 3), (65, [3.0, 0.0, 0.0])), thrust_command=[4.0] * 4)
     assert (row["outcome"], row["end_time"]) == ("tumbled", pytest.approx(4.0))
     # The instant at which it was over is the last that is counted.
     assert row["position_mse.x"] == pytest.approx(25.0 / 41)

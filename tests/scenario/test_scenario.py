@@ -16,8 +16,9 @@ from rotorfault.maths.geometry import Vec3
 from rotorfault.plant import FAULT, GROUND, PLANT, WIND
 from rotorfault.reference import REFERENCE
 from rotorfault.scenario.library import load_scenario, scenario_names
+from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part
-from rotorfault.scenario.scenario import Mismatch, Scenario, scenario_fields, scenario_from, substeps_of
+from rotorfault.scenario.scenario import Scenario, scenario_fields, scenario_from, substeps_of
 from rotorfault.scenario.slots import SLOTS
 
 STEP = {"kind": "step", "rotor": 2, "time": 0.5, "loss": 0.3}

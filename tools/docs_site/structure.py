@@ -40,6 +40,7 @@ CHILDREN: dict[str, list[str]] = {
         "diagnosis",
         "allocation",
         "attainable",
+        "total-loss",
         "frames",
         "riccati",
         "explanations/fair-comparison",
@@ -81,7 +82,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
         "Before a flight",
         "What a vehicle and a loop can do, known without flying.",
         ["trim_report", "hover_margin", "torque_reserve", "critical_loss", "critical_pair", "acai",
-         "ControlAuthority", "critical_thrust_to_weight", "critical_loss_with"],
+         "ControlAuthority", "critical_thrust_to_weight", "critical_loss_with", "null_space", "NullSpace"],
     ),
     "tune": ("Tune", "Search of gains.", ["tune", "Tuned"]),
     "files": (

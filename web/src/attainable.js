@@ -6,10 +6,10 @@ const DIRECTIONS = 144;
 
 /** Limits of each rotor's thrust in N with given losses; a loss that is { stuck: N } leaves that thrust alone. */
 function limits(vehicle, losses) {
-  return losses.map((loss) => {
+  return losses.map((loss, k) => {
     if (typeof loss === 'object') return [loss.stuck, loss.stuck];
-    const share = (1 - Math.min(Math.max(loss, 0), 1)) * vehicle.gain;
-    return [share * vehicle.thrust_min, share * vehicle.thrust_max];
+    const share = 1 - Math.min(Math.max(loss, 0), 1);
+    return vehicle.rotors[k].limits.map((limit) => share * limit);
   });
 }
 

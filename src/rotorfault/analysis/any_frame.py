@@ -7,6 +7,7 @@ its limits. Many cases are solved as one block-diagonal program by HiGHS; the sa
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +17,12 @@ from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.motion import greatest_thrust, mean_of
 from rotorfault.model.vehicle import Vehicle
 
 UP, ROLL, PITCH, YAW = range(4)
 MISSED = 1e-8  # of the largest thrust: what equations may be missed by and count as met
+CONTROLLED_AT_ONCE = 500  # cases whose facets are looked at together, for memory
 MOST_AT_ONCE = 2000  # cases of one program: their time grows faster than their number
 
 
@@ -53,7 +56,7 @@ def frame_of(vehicle: Vehicle, low: PerRotor, high: PerRotor, needed: Scalar) ->
         Thrust of hover.
     """
     columns = [x for row in effectiveness(vehicle) for x in row]
-    numbers = [*columns, *low, *high, needed, vehicle.rotor_gain * vehicle.thrust_max]
+    numbers = [*columns, *low, *high, needed, mean_of(greatest_thrust(vehicle))]
     whole = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in numbers))
     shape, count = whole[0].shape, vehicle.rotors
     cases, place = np.unique(np.stack([x.ravel() for x in whole], axis=1), axis=0, return_inverse=True)
@@ -143,6 +146,38 @@ def reach(frame: Frame) -> Reach:
     with np.errstate(invalid="ignore"):
         left = np.where(most < least, np.nan, np.clip(0.0, least, most)) * frame.lengths[:, YAW] * frame.unit
     return Reach(*(frame.told(x) for x in (*ends, left)))
+
+
+def controlled(frame: Frame, channels: int) -> Scalar:
+    """1 where every small change of wrench about hover can be given, in the first channels, else 0.
+
+    Of the zonotope of all wrenches, hover has to lie within both planes of every facet, as in
+    `rotorfault.analysis.controllability`. A rotor that gives nothing spans no facet; planes along it bound the set
+    all the same, and where the set is flat its own plane is among them, for all rotors together reach every channel.
+
+    Parameters
+    ----------
+    frame : Frame
+    channels : int
+        4 for thrust, roll, pitch and yaw; 3 to give up yaw.
+    """
+    found = np.zeros(len(frame.rows))
+    three = np.array(list(combinations(range(frame.low.shape[1]), channels - 1)))
+    for first in range(0, len(found), CONTROLLED_AT_ONCE):
+        part = slice(first, first + CONTROLLED_AT_ONCE)
+        rows, low, high = frame.rows[part, :channels], frame.low[part], frame.high[part]
+        columns = rows.transpose(0, 2, 1)[:, three]  # (cases, facets, channels - 1, channels)
+        minors = [(-1.0) ** k * np.linalg.det(np.delete(columns, k, axis=3)) for k in range(channels)]
+        normals = np.stack(minors, axis=2)
+        length = np.linalg.norm(normals, axis=2)
+        flat = length <= MISSED * np.linalg.norm(columns, axis=3).prod(axis=2)
+        normals = normals / np.where(flat, 1.0, length)[:, :, None]
+        along = normals @ rows  # (cases, facets, rotors)
+        middle = np.einsum("cfr,cr->cf", along, 0.5 * (low + high))
+        hover = normals[:, :, UP] * (frame.needed[part] / frame.lengths[part, UP])[:, None]
+        room = 0.5 * np.einsum("cfr,cr->cf", np.abs(along), high - low) - np.abs(hover - middle)
+        found[part] = ((room > MISSED) | flat).all(axis=1)
+    return frame.told(found)
 
 
 def least_thrust(frame: Frame, own: int, with_yaw: bool) -> Scalar:

@@ -41,7 +41,7 @@ from rotorfault.base.bounds import positive, require, whole_number
 from rotorfault.base.errors import InputError, choices, short, unknown
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, spread
 from rotorfault.model.frames import ALIASES, FRAMES, Frame, load_frame
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle, vehicle_names
@@ -285,7 +285,7 @@ def hover_problem(of: Craft) -> HoverProblem:
     wrenches = [wrench_of(thing, PerRotor.of(row)) for row in np.eye(count)]
     B = np.array([[wrench.thrust, *wrench.torque_B] for wrench in wrenches], dtype=float).T
     low, high = (
-        np.broadcast_to(np.asarray(thing.rotor_gain * limit, dtype=float), count).copy()
+        np.array([float(x) for x in spread(thing.rotor_gain * limit, count)])
         for limit in (thing.thrust_min, thing.thrust_max)
     )
     return HoverProblem(B, low, high, np.array([float(thing.mass * thing.gravity), 0.0, 0.0, 0.0]))

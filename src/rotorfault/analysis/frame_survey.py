@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rotorfault.analysis.controllability import HoverProblem, control_authority, critical_scale, hover_problem
+from rotorfault.analysis.flown_frames import flown_row
 from rotorfault.base.bounds import positive
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.base.text_table import table_lines, terminal_width
@@ -86,6 +87,8 @@ def _case(frame: Frame, problem: HoverProblem, failed: tuple[int, ...]) -> Frame
 def write_cases(cases: Iterable[FrameCase], path: Path) -> None:
     """Write cases as JSON: a list of objects with the names of a case; the ratio is null where none is enough.
 
+    Under ``flown`` stands what became of kept flights without the motor, null where there are none.
+
     Parameters
     ----------
     cases : iterable of FrameCase
@@ -100,7 +103,8 @@ def write_cases(cases: Iterable[FrameCase], path: Path) -> None:
     rows = []
     for case in cases:
         ratio = case.critical_thrust_to_weight
-        rows.append({**case._asdict(), "critical_thrust_to_weight": ratio if math.isfinite(ratio) else None})
+        row = {**case._asdict(), "critical_thrust_to_weight": ratio if math.isfinite(ratio) else None}
+        rows.append({**row, "flown": flown_row(case.frame, case.failed, case.channels == HELD)})
     text = "[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n"
     write_atomically(in_folder(path), lambda temporary: temporary.write_text(text, encoding="utf-8"))
 

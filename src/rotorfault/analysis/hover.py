@@ -39,7 +39,7 @@ from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, spread, zeros
 from rotorfault.maths.scalar import (
     NAN,
     Scalar,
@@ -55,7 +55,9 @@ from rotorfault.maths.scalar import (
     negated,
     select,
 )
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import from_pairs, in_pairs
+from rotorfault.model.motion import greatest_thrust, mean_of
 from rotorfault.model.vehicle import Vehicle
 
 # Of the greatest thrust of a rotor: at a critical loss, known but for rounding, hover is possible.
@@ -141,7 +143,7 @@ def hover_margin(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -
 def _any_margin(vehicle: Vehicle, ranges: tuple[PerRotor, PerRotor], needed: Scalar, upright: Scalar) -> HoverMargin:
     """The same for a frame without opposite pairs."""
     found = any_frame.reach(any_frame.frame_of(vehicle, *ranges, needed))
-    spinning, room = ranges[1].sum(), any_frame.MISSED * vehicle.rotor_gain * vehicle.thrust_max
+    spinning, room = _spinning(vehicle, *ranges), any_frame.MISSED * mean_of(greatest_thrust(vehicle))
 
     def possible(least: Scalar, most: Scalar) -> Scalar:
         return both(upright, both(less_equal(least, needed + room), less_equal(needed, most + room)))
@@ -160,6 +162,21 @@ def _any_margin(vehicle: Vehicle, ranges: tuple[PerRotor, PerRotor], needed: Sca
         spinning=both(upright, less_equal(needed, spinning + room)),
         yaw_torque=select(without_yaw, found.yaw_torque, NAN),
     )
+
+
+def hover_controlled(vehicle: Vehicle, loss: PerRotor, wind_W: Vec3 | None = None) -> tuple[Scalar, Scalar]:
+    """Whether hover can be controlled, not only held: 1 or 0 with yaw held, and with yaw given up.
+
+    It can where the control authority index is positive (`rotorfault.analysis.controllability`).
+
+    Parameters
+    ----------
+    vehicle, loss, wind_W
+        As for `hover_margin`.
+    """
+    needed, upright = _needed(vehicle, wind_W)
+    frame = any_frame.frame_of(vehicle, *_thrust_ranges(vehicle, loss), needed)
+    return both(upright, any_frame.controlled(frame, 4)), both(upright, any_frame.controlled(frame, 3))
 
 
 def critical_loss(
@@ -205,7 +222,8 @@ def critical_loss(
         # Whatever it is commanded, with a loss it gives as little as is asked for.
         low = PerRotor.of(0.0 if k == own else x for k, x in enumerate(low))
         frame = any_frame.frame_of(vehicle, low, high, needed)
-        left = any_frame.least_thrust(frame, own, yaw) / (vehicle.rotor_gain * vehicle.thrust_max)
+        strongest = spread(greatest_thrust(vehicle), vehicle.rotors)[own]
+        left = any_frame.least_thrust(frame, own, yaw) / strongest
         return select(upright, clip(1.0 - left, 0.0, 1.0), NAN)
     low, high = _thrust_ranges(vehicle, loss)
     room = _room(vehicle)
@@ -333,7 +351,7 @@ def _thrust_ranges(vehicle: Vehicle, loss: PerRotor) -> tuple[PerRotor, PerRotor
     require(loss, PerRotor, "loss", "a PerRotor, such as PerRotor(0.4, 0, 0, 0)")
     if len(loss) != vehicle.rotors:
         raise InputError(f"loss: got {len(loss)} numbers; allowed: one for each of the {vehicle.rotors} rotors")
-    effect = loss.map(lambda x: (1.0 - x) * vehicle.rotor_gain)
+    effect = (1.0 - loss) * vehicle.rotor_gain
     return effect * vehicle.thrust_min, effect * vehicle.thrust_max
 
 
@@ -353,8 +371,17 @@ def _needed(vehicle: Vehicle, wind_W: Vec3 | None) -> tuple[Scalar, Scalar]:
     return force_W.norm(), greater_equal(force_W.z, 0.0)
 
 
+def _spinning(vehicle: Vehicle, low: PerRotor, high: PerRotor) -> Scalar:
+    """Largest thrust in N along body z of all rotors."""
+    if vehicle.tilt == ():
+        return high.sum()
+    up = effectiveness(vehicle).thrust
+    most: Scalar = low.map(lambda a, b, z: maximum(a * z, b * z), high, up).sum()
+    return most
+
+
 def _room(vehicle: Vehicle) -> Scalar:
-    return TOLERANCE * vehicle.rotor_gain * vehicle.thrust_max
+    return mean_of(greatest_thrust(vehicle, TOLERANCE))
 
 
 def _index(rotor: int, vehicle: Vehicle) -> int:

@@ -37,6 +37,7 @@ from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Context
 from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.motion import mean_of, span_text
 from rotorfault.model.signals import Command, Wrench
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle, wrench_of
@@ -187,7 +188,8 @@ def equations(vehicle: Vehicle) -> list[str]:
             text = " ".join(terms).removeprefix("+").replace("+", "+ ").replace(" -", " - ").replace("e+ ", "e+")
             lines.append(f"  d {name}/dt = {text}")
     lines.append(
-        f"  each thrust follows its command with {vehicle.rotor_bandwidth:g} rad/s, gain {vehicle.rotor_gain:g}"
+        f"  each thrust follows its command with {span_text(vehicle.rotor_bandwidth)} rad/s, "
+        f"gain {span_text(vehicle.rotor_gain)}"
     )
     return lines
 
@@ -369,7 +371,7 @@ def _input(flight: _Flight, x: Array) -> Array:
     """B for all states."""
     vehicle = flight.vehicle
     arm = max(math.hypot(a, b) for a, b in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True))
-    h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, vehicle.torque_ratio])
+    h = 1e-4 * vehicle.mass * vehicle.gravity * np.array([1.0, arm, arm, mean_of(vehicle.torque_ratio)])
     start, d = np.repeat(x, 4, axis=1), np.diag(h)
     B: Array = (flight.advance(start, d)[0] - flight.advance(start, -d)[0]) / (2.0 * h)
     return B

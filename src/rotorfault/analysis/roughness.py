@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotorfault.base.config import Strict
 from rotorfault.maths.arrays import ANGLES, Array
-from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.geometry import Vec3, spread
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Vehicle
@@ -68,15 +69,16 @@ def limit_in_hover(vehicle: Vehicle, asked: Array) -> str:
 
 
 def _limits(vehicle: Vehicle) -> str:
-    return f"{vehicle.thrust_min:g} to {vehicle.thrust_max:g} N"
+    low, high = (spread(limit, vehicle.rotors) for limit in (vehicle.thrust_min, vehicle.thrust_max))
+    return f"{min(low):g} to {max(high):g} N"
 
 
-def _at_limit(vehicle: Vehicle, asked: Array) -> Array:
+def _at_limit(vehicle: Vehicle, asked: Array) -> NDArray[np.bool_]:
     """Which commands are at a limit, from the wrench that they give, shape (rotors, columns)."""
     thrust = nominal_inverse(vehicle, Wrench(asked[0], Vec3(asked[1], asked[2], asked[3])))
-    command = np.array(list(thrust)) / vehicle.rotor_gain
-    near = NEAR * vehicle.thrust_max
-    at: Array = (command <= vehicle.thrust_min + near) | (command >= vehicle.thrust_max - near)
+    command = np.array(list(thrust / vehicle.rotor_gain))
+    low, high = (np.array([*spread(x, vehicle.rotors)])[:, None] for x in (vehicle.thrust_min, vehicle.thrust_max))
+    at: NDArray[np.bool_] = (command <= low + NEAR * high) | (command >= high - NEAR * high)
     return at
 
 

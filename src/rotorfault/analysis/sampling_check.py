@@ -30,6 +30,7 @@ from rotorfault.maths.records import flatten, unflatten
 from rotorfault.maths.rotation import Quat
 from rotorfault.model.block import Context
 from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.motion import mean_bandwidth
 from rotorfault.model.signals import Estimate, Reference, at_rest, healthy
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.reference import REFERENCE
@@ -156,7 +157,7 @@ def sampled_data_check(
         Any; one that reports no gains cannot be checked and gives no warning, nor one of the python engine only,
         which may keep state of its own that a trial step would change.
     vehicle : Vehicle
-        As the autopilot believes it to be; its `rotor_bandwidth` is the lag.
+        As the autopilot believes it to be; the lag is the mean one of its rotors.
     period : float, s
     estimate, reference : optional
         Start of a flight, checked besides the hover at the target.
@@ -180,7 +181,7 @@ def sampled_data_check(
         except (ZeroDivisionError, OverflowError):
             return [f"{where}: the controller's gains are not finite; its settings are too extreme for doubles"]
         for gains in reported:
-            line = warning(gains, period, vehicle.rotor_bandwidth, where)
+            line = warning(gains, period, mean_bandwidth(vehicle), where)
             if line is not None:
                 lines.setdefault(gains.axis, line)
     return list(lines.values())

@@ -17,28 +17,32 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotorfault.analysis.attainable import Attainable, attainable, attainable_lines
-from rotorfault.analysis.linearisation import AXES, DEADBEAT, LinearLoop, equations, linearise
+from rotorfault.analysis.linearisation import LinearLoop, equations, linearise
 from rotorfault.analysis.margins import Margins, margins
+from rotorfault.analysis.null_space import null_space_lines
+from rotorfault.analysis.poles import distinct_poles, pole_text
+from rotorfault.analysis.reach import reach_lines
 from rotorfault.analysis.sampling_check import LEAST_DAMPING, sampled_data_check, sampled_data_warnings
+from rotorfault.analysis.signatures import Signatures, signature_lines, told_apart
+from rotorfault.analysis.vehicle_settings import vehicle_with
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.control.attitude import attitude_for
 from rotorfault.autopilot.control.protocol import Controller
 from rotorfault.autopilot.control.python_controller import as_controller
 from rotorfault.base.bounds import positive, require
-from rotorfault.base.config import validate
 from rotorfault.base.errors import InputError
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters
-from rotorfault.maths.arrays import ANGLES
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, spread, zeros
 from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.motion import greatest_thrust, span_text
 from rotorfault.model.signals import Wrench
 from rotorfault.model.slot import Slot
-from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_check import most_torque, vehicle_warnings
-from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import named_places, substeps_of
@@ -50,7 +54,6 @@ __all__ = ["Hover", "TrimReport", "hover", "hover_loop", "sampled_data_warnings"
 LEAST_GAIN_MARGIN = 2.0
 LEAST_PHASE_MARGIN = math.radians(30.0)
 LONGEST_PERIOD = 0.1  # s: slower no vehicle is held in hover, and each trial step takes a step per ms of it
-SAME_POLE = 2e-3  # relative distance within which poles are listed as one; a computed double pole is split a little
 
 
 class Hover(NamedTuple):
@@ -77,6 +80,7 @@ class TrimReport(NamedTuple):
     numbers: Vehicle
     hover: Hover
     attainable: Attainable
+    signatures: Signatures | None  # None for opposite pairs, of which a diagnosis sees each rotor by itself
     linear: LinearLoop | None  # None where the loop has no linearisation; `warnings` says why
     margins: dict[str, Margins]  # per axis of `rotorfault.analysis.linearisation.AXES`; empty without linearisation
     warnings: tuple[str, ...]
@@ -102,7 +106,9 @@ class TrimReport(NamedTuple):
         """Plain text for a terminal of 100 columns."""
         model = ["Linearisation at hover (T, tau: wrench less that of hover)", *equations(self.numbers)]
         loop = (model, _pole_lines(self), _margin_lines(self), _warning_lines(self))
-        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), *loop)
+        free = null_space_lines(self.numbers, self.attainable.loss)
+        told = [] if self.signatures is None else signature_lines(self.signatures)
+        parts = (_hover_lines(self), attainable_lines(self.attainable, self.numbers), free, told, *loop)
         return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
@@ -127,7 +133,7 @@ def hover(vehicle: Vehicle, wind_W: Vec3 | None = None) -> Hover:
         rotor_speed=rotor_speeds(vehicle, thrust),
         attitude=attitude_for(force_W, 1.0, 0.0, 0.0),
         tilt=math.atan2(math.hypot(force_W.x, force_W.y), force_W.z),
-        thrust_margin=vehicle.rotors * k * vehicle.thrust_max / needed,
+        thrust_margin=_most_up(vehicle) / needed,
         torque_max=Vec3.of(most_torque(vehicle, thrust, Vec3.of(unit)) for unit in np.eye(3).tolist()),
     )
 
@@ -201,12 +207,8 @@ def trim_report(
     if loss is not None and not all(0.0 <= x <= 1.0 for x in loss):
         raise InputError(f"loss: got {list(loss)}; allowed: 0 to 1 for each rotor")
     mine, its = _shared_out(settings, isinstance(controller, str), not isinstance(vehicle, Vehicle))
-    if isinstance(vehicle, (str, Path)):
-        vehicle = load_vehicle(vehicle)
-    if isinstance(vehicle, VehicleFile) and its:
-        tables: dict[str, Any] = {"vehicle": vehicle.model_dump(mode="json")}
-        override_all(tables, its)
-        vehicle = validate(VehicleFile, tables["vehicle"], f"vehicle '{vehicle.name}' with its settings")
+    if not isinstance(vehicle, Vehicle):
+        vehicle = vehicle_with(vehicle, its)
     label, numbers = (vehicle.name, vehicle.vehicle) if isinstance(vehicle, VehicleFile) else ("vehicle", vehicle)
     if isinstance(controller, str):
         named: dict[str, Any] = {"controller": {"kind": controller} | ({} if preset is None else {"preset": preset})}
@@ -226,7 +228,9 @@ def trim_report(
     except InputError as error:
         warnings.append(f"no linearisation: {error}")
     possible = attainable(numbers, loss)
-    return TrimReport(label, name, period, numbers, hover(numbers), possible, linear, axis_margins, tuple(warnings))
+    told = None if numbers.pairs else told_apart(numbers, period)
+    held = hover(numbers)
+    return TrimReport(label, name, period, numbers, held, possible, told, linear, axis_margins, tuple(warnings))
 
 
 def _shared_out(
@@ -256,10 +260,10 @@ def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list
     if not linear.stable:
         z = linear.poles[0]
         s = np.log(z) / linear.period
-        return [f"the closed loop is not stable in hover: pole {_complex(s)} rad/s, |z| = {abs(z):.6g}; no margins"]
+        return [f"the closed loop is not stable in hover: pole {pole_text(s)} rad/s, |z| = {abs(z):.6g}; no margins"]
     lines = [
-        f"closed-loop pole {_complex(s)} rad/s is poorly damped: {-s.real / abs(s):.2g}, below {LEAST_DAMPING:g}"
-        for s, _, _ in _distinct(linear)
+        f"closed-loop pole {pole_text(s)} rad/s is poorly damped: {-s.real / abs(s):.2g}, below {LEAST_DAMPING:g}"
+        for s, _, _ in distinct_poles(linear)
         if -s.real < LEAST_DAMPING * abs(s)
     ]
     for axis, m in axis_margins.items():
@@ -280,7 +284,7 @@ def _loop_warnings(linear: LinearLoop, axis_margins: dict[str, Margins]) -> list
 
 def _hover_lines(report: TrimReport) -> list[str]:
     v, h = report.numbers, report.hover
-    limits = f"{v.thrust_min:g} to {v.thrust_max:g} N"
+    limits = f"{min(spread(v.thrust_min, v.rotors)):g} to {max(spread(v.thrust_max, v.rotors)):g} N"
     thrust, command = _span(h.thrust, 1.0), _span(h.command, 1.0)
     speed, rpm = _span(h.rotor_speed, 1.0), _span(h.rotor_speed, 30.0 / math.pi)
     torque = ", ".join(f"{t:.3g}" for t in h.torque_max)
@@ -295,12 +299,27 @@ def _hover_lines(report: TrimReport) -> list[str]:
                 ("speed of a rotor", f"{speed} rad/s ({rpm} rpm)"),
                 ("thrust to weight", f"{h.thrust_margin:.3g}"),
                 ("torque in reserve", f"{torque} N m about roll, pitch, yaw ({turn} rad/s^2)"),
-                ("rotor lag", f"{v.rotor_bandwidth:g} rad/s"),
+                ("rotor lag", _lag_text(v)),
+                *(("tilted rotors", line) for line in reach_lines(v)[1:]),
             ],
             "<<",
             indent=2,
         ),
     ]
+
+
+def _most_up(vehicle: Vehicle) -> float:
+    """Greatest thrust in N of all rotors along body z."""
+    most = greatest_thrust(vehicle)
+    if not isinstance(most, PerRotor) and vehicle.tilt == ():
+        return float(vehicle.rotors * most)
+    return float(wrench_of(vehicle, spread(most, vehicle.rotors)).thrust)
+
+
+def _lag_text(vehicle: Vehicle) -> str:
+    text = f"{span_text(vehicle.rotor_bandwidth)} rad/s"
+    down = vehicle.rotor_bandwidth_down
+    return text if isinstance(down, tuple) else f"{text} up, {span_text(down)} rad/s down"
 
 
 def _span(values: PerRotor, factor: float) -> str:
@@ -314,8 +333,8 @@ def _pole_lines(report: TrimReport) -> list[str]:
         return ["Closed-loop poles: none, the loop has no linearisation"]
     count, left = len(report.linear.names), len(report.linear.left_out)
     rows = [("pole [rad/s]", "|s| rad/s", "damping", "times", "motion")]
-    for s, times, motion in _distinct(report.linear):
-        rows.append((_complex(s), f"{abs(s):.4g}", f"{-s.real / max(abs(s), 1e-300):.3f}", str(times), motion))
+    for s, times, motion in distinct_poles(report.linear):
+        rows.append((pole_text(s), f"{abs(s):.4g}", f"{-s.real / max(abs(s), 1e-300):.3f}", str(times), motion))
     return [
         f"Closed-loop poles in hover, log(z)/T ({count} states; {left} that do not act on the motion left out)",
         *table_lines(rows, ">>>><", indent=2),
@@ -350,34 +369,3 @@ def _warning_lines(report: TrimReport) -> list[str]:
 
 def _decibel(gain: float) -> str:
     return f"{20.0 * math.log10(gain):.1f} dB" if 0.0 < gain < math.inf else "none" if gain == gain else "-"
-
-
-def _complex(s: complex) -> str:
-    return f"{s.real:.4g}" if abs(s.imag) < 1e-6 * abs(s) else f"{s.real:.4g} +- {abs(s.imag):.4g}j"
-
-
-# Translation along x goes through pitch, along y through roll.
-_MOTION = {"p_W": ("pitch", "roll", "thrust"), "v_W": ("pitch", "roll", "thrust")}
-
-
-def _distinct(linear: LinearLoop) -> list[tuple[complex, int, str]]:
-    """Poles log(z)/T in the upper half plane, slowest first, how often each comes, and the axes that move in it."""
-    z, vectors = np.linalg.eig(linear.A)
-    motion = np.zeros((len(AXES), len(z)))
-    for name, row in zip(linear.names, np.abs(vectors), strict=True):
-        field, component = name.split(".")[-2:]
-        if name.startswith("plant.body.") and component in "xyz":
-            motion[AXES.index(_MOTION.get(field, ANGLES)["xyz".index(component)])] += row
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = np.log(z.astype(complex)) / linear.period
-    # Computed, a double real pole is a close complex pair.
-    s = np.where(np.abs(s.imag) <= 1e-5 * np.abs(s), s.real, s)
-    left = [i for i in np.argsort(np.abs(s)) if abs(z[i]) > DEADBEAT and s[i].imag >= 0.0]
-    poles: list[tuple[complex, int, str]] = []
-    while left:
-        same = [i for i in left if abs(s[i] - s[left[0]]) <= SAME_POLE * abs(s[left[0]])]
-        share = motion[:, same].sum(axis=1)
-        moved = [axis for axis, part in zip(AXES, share, strict=True) if part > max(1e-4 * share.max(), 1e-9)]
-        poles.append((complex(np.mean(s[same])), len(same), ", ".join(moved) or "none (memory)"))
-        left = [i for i in left if i not in same]
-    return poles

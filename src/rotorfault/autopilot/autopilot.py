@@ -15,11 +15,12 @@ from rotorfault.autopilot.control.protocol import ControlOutput
 from rotorfault.autopilot.diagnosis.protocol import Oracle
 from rotorfault.autopilot.instant import Decision, Instant, Past
 from rotorfault.autopilot.rotor_model import expected_thrust, follow, rotors_at_hover
-from rotorfault.maths.geometry import PerRotor, zeros
+from rotorfault.maths.geometry import PerRotor, per_rotor, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, Record
 from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.motion import idle
 from rotorfault.model.signals import Allocation, Command, Readings, Reference, Wrench, healthy, motion_of
 from rotorfault.model.slot import Slot
 from rotorfault.model.telemetry import example
@@ -103,7 +104,7 @@ class Autopilot:
             memories.append(part.initial(inputs, numbers))
             if slot.name == "estimator":
                 instant.outputs[slot.name] = part.step(memories[-1], inputs, numbers, dt)[1]
-        past = past._replace(previous=motion_of(instant.estimate))
+        past = past._replace(previous=motion_of(instant.estimate, vehicle.tilt != ()))
         return AutopilotMemory(past, self._record(*memories))
 
     def step(
@@ -174,8 +175,8 @@ class Autopilot:
         relief = decision.relief
         if isinstance(relief, tuple):
             return allocation
-        least = instant.vehicle.thrust_min
-        command = allocation.command.map(lambda f: least + (f - least) * (1.0 - relief))
+        least = idle(instant.vehicle)
+        command = per_rotor(lambda f, least: least + (f - least) * (1.0 - relief), allocation.command, least)
         return account(instant.vehicle, wrench, decision.diagnosis, command)
 
 

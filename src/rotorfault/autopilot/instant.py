@@ -122,7 +122,8 @@ class Instant:
     @cached_property
     def expectation(self) -> Expectation:
         """The last period as believed with sound rotors."""
-        now, thrust = motion_of(self.estimate), expected_thrust(self.past.rotors, self.vehicle)
+        tilted = self.vehicle.tilt != ()
+        now, thrust = motion_of(self.estimate, tilted), expected_thrust(self.past.rotors, self.vehicle)
         speed = rotor_speeds(self.vehicle, thrust)
         return Expectation(
             now=now,

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.motion import angular_acceleration, drag_acceleration
+from rotorfault.model.motion import angular_acceleration, drag_acceleration, torque_of_turning
 from rotorfault.model.signals import Motion, Stuck, following
-from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, wrench_of
+from rotorfault.model.vehicle import Vehicle, lateral_force, residual_speed, turn_against_rotors, wrench_of
 
 
 class Expectation(NamedTuple):
@@ -22,7 +22,7 @@ class Expectation(NamedTuple):
     previous: Motion  # one period earlier; the same as `now` at the first step
     mean_thrust: PerRotor  # N: thrust of sound rotors averaged over the period
     thrust: PerRotor  # N: thrust of sound rotors now
-    residual_speed: Scalar  # rad/s: believed Omega of (4)
+    residual_speed: Scalar | Vec3  # rad/s: believed Omega of (4); of tilted rotors its vector
     speed: PerRotor  # rad/s: of sound rotors now
     sped: PerRotor  # rad/s: by which that has changed over the period
     direct_acceleration_W: Vec3  # m/s^2: commanded over the period, zero without the option `six_inputs`
@@ -52,7 +52,8 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
     """
     stuck = following(vehicle.rotors) if stuck is None else stuck
     e, before, now = expectation, expectation.previous, expectation.now
-    wrench = wrench_of(vehicle, stuck.thrust_of(e.mean_thrust, loss))
+    thrust = stuck.thrust_of(e.mean_thrust, loss)
+    wrench = wrench_of(vehicle, thrust)
     axis_W = (before.axis_W + now.axis_W) * 0.5
     v_W = (before.v_W + now.v_W) * 0.5
     omega_B = (before.omega_B + now.omega_B) * 0.5
@@ -62,7 +63,14 @@ def predict(expectation: Expectation, loss: PerRotor, vehicle: Vehicle, stuck: S
         + drag_acceleration(vehicle, -v_W)
         + e.direct_acceleration_W
     )
-    turn = angular_acceleration(vehicle, wrench.torque_B, omega_B, e.residual_speed)
+    if now.level_W and before.level_W:
+        forward_W, left_W = ((a + b) * 0.5 for a, b in zip(before.level_W, now.level_W, strict=True))
+        lateral_B = lateral_force(vehicle, thrust)
+        acceleration_W = acceleration_W + (forward_W * lateral_B.x + left_W * lateral_B.y) / vehicle.mass
+    torque_B = (
+        wrench.torque_B if vehicle.air == () else wrench.torque_B + torque_of_turning(vehicle, omega_B, e.speed)
+    )
+    turn = angular_acceleration(vehicle, torque_B, omega_B, e.residual_speed)
     return Prediction(acceleration_W * e.elapsed, turn * e.elapsed + reaction(e, vehicle, stuck.rotor))
 
 
@@ -79,4 +87,5 @@ def reaction(expectation: Expectation, vehicle: Vehicle, stuck: PerRotor) -> Vec
         1 for a rotor that is believed not to follow, nor to change its speed.
     """
     sped = expectation.sped * (1.0 - stuck)
-    return Vec3(0.0, 0.0, -rate_against_rotors(vehicle, residual_speed(vehicle, sped)))
+    turned = turn_against_rotors(vehicle, residual_speed(vehicle, sped))
+    return -turned if isinstance(turned, Vec3) else Vec3(0.0, 0.0, -turned)

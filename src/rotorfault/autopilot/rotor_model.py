@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.mixer import hover_thrust
-from rotorfault.model.motion import lag_held, limited
+from rotorfault.model.motion import lag_bandwidth, lag_held, limited
 from rotorfault.model.vehicle import Vehicle
 
 
@@ -36,5 +36,6 @@ def expected_thrust(model: RotorModel, vehicle: Vehicle) -> PerRotor:
 
 def follow(model: RotorModel, command: PerRotor, vehicle: Vehicle, dt: Scalar) -> RotorModel:
     """Hold commands [N] for a period; they are limited as the rotors limit them."""
-    end, mean = lag_held(model.lagged, limited(vehicle, command), vehicle.rotor_bandwidth, dt)
+    entering = limited(vehicle, command)
+    end, mean = lag_held(model.lagged, entering, lag_bandwidth(vehicle, model.lagged, entering), dt)
     return RotorModel(lagged=end, mean=mean * vehicle.rotor_gain)

@@ -40,8 +40,8 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``machine``, ``single``, ``batch`` (by size), ``operations``, ``noise``, ``scaling``, ``sdre``, ``latency``,
-        ``accuracy`` (None without heyoka), ``peers`` (empty unless asked for).
+        ``machine``, ``single``, ``batch`` (by size), ``frames`` (by number of rotors), ``operations``, ``noise``,
+        ``scaling``, ``sdre``, ``latency``, ``accuracy`` (None without heyoka), ``peers`` (empty unless asked for).
 
     Raises
     ------
@@ -65,6 +65,7 @@ def run(with_peers: bool, quick: bool, say: Say) -> dict[str, Any]:
         },
         "single": flights.measure_single(quick, say),
         "batch": flights.measure_batches(cores, quick, say),
+        "frames": flights.measure_frames(quick, say),
         "noise": flights.measure_noise(quick, say),
         "scaling": flights.measure_scaling(quick, say),
     }
@@ -157,7 +158,21 @@ def _flights(results: dict[str, Any]) -> str:
         _table(head, rows)
         + f"\none flight of 20 s through rf.fly, with all records: {single['seconds']:.3f} s"
         + f" ({single['simulated_s_per_s']:,.0f} simulated s/s)"
+        + _frames(results["frames"])
     )
+
+
+def _frames(speeds: dict[str, Any]) -> str:
+    rows = [
+        (
+            f"{rotors} rotors, {part['vehicle']}",
+            f"{part['steps_per_s'] * 1e-6:.2f} M",
+            f"{part['simulated_s_per_s_per_core']:,.0f}",
+            f"{part['cost_factor']:.2f}",
+        )
+        for rotors, part in speeds.items()
+    ]
+    return "\n\n" + _table(("batch of 10,000 by rotors", "steps/s, one core", "simulated s/s", "cost"), rows)
 
 
 def _megabytes(peak: float | None) -> str:

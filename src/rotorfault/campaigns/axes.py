@@ -18,6 +18,8 @@ from rotorfault.plant.sensors import Noisy
 from rotorfault.scenario.preset_file import is_preset_file
 
 Columns = dict[str, NDArray[Any]]
+ROTOR_AXES = ("rotor", "second_rotor")
+"""Axes whose numbers are names of rotors: nothing lies between two of them."""
 
 
 class Axis(NamedTuple):
@@ -76,6 +78,21 @@ AXES: dict[str, Axis] = {
     "gust_intensity": Axis(
         "m/s", "wind at 6 m that gusts go with (wind dryden)", _key("gust_intensity", "wind.wind_at_6m"), (0.0, 100.0)
     ),
+    "front_length": Axis(
+        "m", "way from the begin of a gust front to its strongest (wind with front)",
+        _key("front_length", "wind.front.length"), (0.0, 1e4),
+    ),
+    "front_speed": Axis(
+        "m/s", "speed with which a gust front passes", _key("front_speed", "wind.front.speed"), (0.0, 100.0)
+    ),
+    "front_direction": Axis(
+        "rad", "where a gust front travels to, from x towards y", _key("front_direction", "wind.front.direction"),
+        (-TURN, TURN),
+    ),
+    "shear_roughness": Axis(
+        "m", "roughness of the ground (wind with shear by the log law)",
+        _key("shear_roughness", "wind.shear.roughness"), (0.0, 5.0),
+    ),
     "mass": Axis("1", "true over believed mass", _key("mass", "mismatch.mass"), (0.0, np.inf)),
     "inertia": Axis(
         "1", "true over believed inertia, all axes",
@@ -85,6 +102,10 @@ AXES: dict[str, Axis] = {
     "rotor_bandwidth": Axis(
         "1", "true over believed rotor bandwidth", _key("rotor_bandwidth", "mismatch.rotor_bandwidth"), (0.0, np.inf)
     ),
+    "thrust_curve": Axis(
+        "1", "a of the true curve from signal to thrust", _key("thrust_curve", "mismatch.thrust_curve"), (-1.0, 1.0)
+    ),
+    "charge": Axis("1", "charge of the battery at the start", _key("charge", "start.charge"), (0.0, 1.0)),
     "battery_sag": Axis(
         "1", "lost share of all rotors' thrust per command",
         _key("battery_sag", "mismatch.rotor_gain", scale=lambda x: 1.0 - np.asarray(x, dtype=float)), (0.0, 0.99),

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base import foreign
@@ -26,7 +27,7 @@ from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.campaigns.grades import GRADES, SUCCESS
 from rotorfault.campaigns.sampling.refine import Refinement
 from rotorfault.campaigns.studies import FOLDER, LONGEST_NAME, NAME, study_names
-from rotorfault.campaigns.varied import Draw, GridAxis
+from rotorfault.campaigns.varied import Draw, GridAxis, know_rotors
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import is_file, load_scenario, with_whole_paths
 from rotorfault.scenario.overrides import override_all
@@ -93,6 +94,11 @@ class Study(Strict):
         labels = [variant.label for variant in self.variant]
         if len(set(labels)) < len(labels):
             raise refusal("variant", f"two variants are called '{max(labels, key=labels.count)}'")
+        self.require_size()
+        return self
+
+    def require_size(self) -> None:
+        """Refuse more cells and flights than anybody can mean."""
         if self.cells > MOST_CELLS:
             raise refusal("axis", f"makes {self.cells:.3g} cells; allowed: up to {MOST_CELLS:,}; take coarser axes")
         if self.most_flights > MOST_FLIGHTS:
@@ -106,7 +112,6 @@ class Study(Strict):
                 "refine.budget", f"got {self.refine.budget}; allowed: at least {least}, the first "
                 f"{self.refine.initial} flights in each of {self.cells} cells for each variant",
             )  # fmt: skip
-        return self
 
     def __repr__(self) -> str:
         axes = ", ".join(part.name for part in self.axis)
@@ -377,4 +382,10 @@ def study_from(tables: dict[str, Any], where: str, allow_code: bool | Collection
     """
     study = validate(Study, tables, where)
     study._allow_code = allow_code
+    vehicles = (study.tables_of(number).get("vehicle") for number in range(len(study.variant)))
+    if know_rotors(study.axis, vehicles, where):
+        try:
+            study.require_size()
+        except PydanticCustomError as error:
+            raise InputError(f"{where}: {error.message()}") from None
     return study

@@ -2,34 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from typing import Any, Literal
+
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from rotorfault.base.config import Strict, refusal
 from rotorfault.base.errors import InputError
 from rotorfault.base.number_rule import short
-from rotorfault.campaigns.axes import axis, out_of_range
+from rotorfault.campaigns.axes import ROTOR_AXES, axis, out_of_range
+from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+
+ALL = "all"
 
 
 class GridAxis(Strict):
-    """One axis of the map: values, or a number of them evenly spaced between two."""
+    """One axis of the map: values, or a number of them evenly spaced between two; or all rotors of the vehicle."""
 
     name: str = Field(min_length=1, description="name of an axis, or a dotted key of the scenario")
-    values: tuple[float | str, ...] | None = Field(default=None, description="the values")
+    values: tuple[float | str, ...] | Literal["all"] | None = Field(
+        default=None, description='the values; "all" for every rotor of the vehicle, on axes of rotors'
+    )
     start: float | None = Field(default=None, description="first value")
     stop: float | None = Field(default=None, description="last value")
     count: int | None = Field(default=None, ge=2, le=10_000, description="how many")
+
+    _rotors: int = PrivateAttr(default=1)  # of the vehicle, which the study knows
 
     @model_validator(mode="after")
     def _consistent(self) -> GridAxis:
         _require_axis(self.name)
         by_range = (self.start, self.stop, self.count)
+        if self.values == ALL and self.name not in ROTOR_AXES:
+            raise refusal("values", f"got '{ALL}'; allowed on the axes {' and '.join(ROTOR_AXES)} alone; give a list")
         if self.values is not None:
             if any(part is not None for part in by_range):
                 raise refusal("values", "cannot stand beside start, stop and count; give one or the other")
             if not self.values:
                 raise refusal("values", "is empty; give at least one value")
-            if len(set(self.values)) < len(self.values):
+            if self.values != ALL and len(set(self.values)) < len(self.values):
                 raise refusal("values", f"has values twice: {list(self.values)}; give each once")
         elif self.start is None or self.stop is None or self.count is None:
             raise refusal("values", "is missing; give values, or start, stop and count")
@@ -44,6 +56,8 @@ class GridAxis(Strict):
     @property
     def grid(self) -> list[float | str]:
         """The values in order."""
+        if self.values == ALL:
+            return [float(number) for number in range(1, self._rotors + 1)]
         if self.values is not None:
             return list(self.values)
         start, stop, count = self.start or 0.0, self.stop or 0.0, self.count or 0
@@ -78,6 +92,39 @@ class Draw(Strict):
         if wrong := out_of_range(self.name, (*(self.uniform or ()), *(self.choice or ()))):
             raise refusal("", wrong)
         return self
+
+
+def know_rotors(axes: Sequence[GridAxis], vehicles: Iterable[Any], where: str) -> bool:
+    """Tell axes of all rotors how many there are; whether there is any such axis.
+
+    Parameters
+    ----------
+    axes : sequence of GridAxis
+    vehicles : iterable of str or table
+        Of each variant, by name, path or as a table; looked at only where there is such an axis.
+    where : str
+        Origin of the study, for messages.
+
+    Raises
+    ------
+    InputError
+        If vehicles have different numbers of rotors, or an axis varies the vehicle.
+    """
+    every = [part for part in axes if part.values == ALL]
+    if not every:
+        return False
+    key = f"{where}: axis {every[0].name}: values = '{ALL}'"
+    if "vehicle" in [part.name for part in axes]:
+        raise InputError(f"{key} needs one vehicle, and an axis varies it; give numbers")
+    counts = {
+        load_vehicle(one).vehicle.rotors if isinstance(one, str) else VehicleFile.model_validate(one).vehicle.rotors
+        for one in vehicles
+    }
+    if len(counts) > 1:
+        raise InputError(f"{key} with vehicles of {' and '.join(map(str, sorted(counts)))} rotors; give numbers")
+    for part in every:
+        part._rotors = max(counts)
+    return True
 
 
 def _require_axis(name: str) -> None:

@@ -116,7 +116,7 @@ def write_new(what: str, name: str, folder: Path, force: bool, content: str | No
 
 
 def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
-    """Validate a file; one line about what it holds, and a line for each thing in it that is hardly meant.
+    """Validate a file; a line about what it holds (more of a vehicle), and one for each thing that is hardly meant.
 
     Parameters
     ----------
@@ -154,9 +154,13 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
 
 
 def _check_vehicle(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+    # Brings linear programs, which take longer to load than a check of anything else.
+    from rotorfault.analysis.reach import reach_lines
+
     vehicle = load_vehicle(path)
+    more = [f"  {line}" for line in reach_lines(vehicle.vehicle)]
     line = f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
-    return line, vehicle_warnings(vehicle.vehicle)
+    return "\n".join([line, *more]), vehicle_warnings(vehicle.vehicle)
 
 
 def _check_scenario(path: Path, allow_code: bool) -> tuple[str, list[str]]:

@@ -18,6 +18,8 @@ from rotorfault.base.text_table import table_lines, terminal_width
 from rotorfault.campaigns.studies import study_names
 from rotorfault.cli.kinds_of_file import kind_of_file
 from rotorfault.engine import ENGINES
+from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.quantities import value_text
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
 from rotorfault.scenario.library import load_scenario, scenario_names
@@ -165,18 +167,23 @@ def vehicle_text(name: str) -> str:
         Of a vehicle, or the path of its file.
     """
     file = load_vehicle(name)
-    hover = file.mass.value * file.gravity.value / (4.0 * file.rotor_gain.value)
+    commands = [*(hover_thrust(file.vehicle) / file.vehicle.rotor_gain)]
+    hover = f"{min(commands):.4g}" + (f" to {max(commands):.4g}" if max(commands) > 1.0001 * min(commands) else "")
     rows = [["key", "value", "unit", "source"]]
     for key, quantity in file.quantities():
         if not key.startswith("rotor."):
-            rows.append([key, f"{quantity.value:g}", quantity.unit, quantity.source])
-    rotors = [["rotor", "x [m]", "y [m]", "yaw", "name"]]
+            rows.append([key, value_text(quantity), quantity.unit, quantity.source])
+    high, tilted = any(rotor.z for rotor in file.rotor), any(rotor.axis for rotor in file.rotor)
+    rotors = [["rotor", "x [m]", "y [m]", *["z [m]"] * high, "yaw", *["axis"] * tilted, "name"]]
     for number, rotor in enumerate(file.rotor, start=1):
-        rotors.append([str(number), f"{rotor.x.value:g}", f"{rotor.y.value:g}", rotor.yaw, rotor.name])
+        height = ["" if rotor.z is None else f"{rotor.z.value:g}"] * high
+        axis = ["up" if rotor.axis is None else value_text(rotor.axis)] * tilted
+        place = [f"{rotor.x.value:g}", f"{rotor.y.value:g}", *height]
+        rotors.append([str(number), *place, rotor.yaw, *axis, rotor.name])
     return "\n".join(
         [
             f"vehicle {file.name}: {file.description}",
-            f"thrust-to-weight {file.thrust_to_weight:.3g}; hover takes a command of {hover:.4g} N for each rotor",
+            f"thrust-to-weight {file.thrust_to_weight:.3g}; hover takes a command of {hover} N for each rotor",
             "",
             *_table(rows),
             "",

@@ -43,11 +43,13 @@ def frames(
     """Say what frames can lose: which motors may fail before hover cannot be controlled, with and without yaw.
 
     ACAI is how far hover is from what cannot be flown, in N, negative beyond; critical T/W is the least thrust of all
-    sound rotors over weight with which it is inside. A frame that is named is drawn with its motors' numbers too.
+    sound rotors over weight with which it is inside. A frame that is named is drawn with its motors' numbers too, and
+    followed by what became of flights without one of its motors, where there are any.
 
     Example: rotorfault frames hexa-x --rotors-lost 1
     """
     from rotorfault.analysis import frame_survey
+    from rotorfault.analysis.flown_frames import flown_lines
     from rotorfault.base.files import in_folder
     from rotorfault.cli.frame_drawing import drawing_lines, motor_lines
     from rotorfault.cli.losses import parse_failed
@@ -76,6 +78,8 @@ def frames(
             say("\n".join([f"{frame.name}, numbered by {' and '.join(frame.conventions)}", ""]))
             say("\n".join([*drawing_lines(frame), "", *motor_lines(frame), ""]))
             say("\n".join([frame_survey.reference_line(frame, thrust_to_weight), *frame_survey.case_lines(own), ""]))
+            if lines := flown_lines(frame.name, dict.fromkeys(case.failed for case in own)):
+                say("\n".join([*lines, ""]))
     elif numbers is not None:
         say("\n".join([*frame_survey.case_lines(cases, names=True), ""]))
     else:

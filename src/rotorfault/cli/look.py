@@ -70,7 +70,8 @@ def check(
         raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
     line, warnings = catalogue.check(Path(file), allow_code)
     doubts = {0: "", 1: ", with a warning"}.get(len(warnings), f", with {len(warnings)} warnings")
-    say(f"{line}{doubts}")
+    first, *more = line.splitlines()
+    say("\n".join([f"{first}{doubts}", *more]))
     for warning in warnings:
         say(f"warning: {warning}", err=True)
 
@@ -98,12 +99,17 @@ def trim(
         list[str] | None,
         typer.Option("--loss", metavar="R=VALUE", help="Loss of rotor R, 0 to 1; one for each rotor at most."),
     ] = None,
+    dead: Annotated[
+        list[int] | None,
+        typer.Option("--dead", metavar="R", help="Rotor that gives nothing, for relaxed hover; may be repeated."),
+    ] = None,
 ) -> None:
     """Print hover, what losses leave of it, linearisation, closed-loop poles, gain and delay margins.
 
-    Losses matter to the block "attainable hover" alone: whether hover is still possible, whoever controls.
+    Losses matter to the block "attainable hover" alone: whether hover is still possible, whoever controls. --dead
+    prints relaxed hover instead: how the vehicle stays in the air without these rotors, spinning if it must.
 
-    Example: rotorfault trim paper --controller smc --loss 1=0.4
+    Examples: rotorfault trim paper --controller smc --loss 1=0.4; rotorfault trim mueller-2014 --dead 1
     """
     from rotorfault.analysis.trim import trim_report
     from rotorfault.cli.losses import parse_losses
@@ -112,5 +118,12 @@ def trim(
 
     settings = parse_overrides(assignments or [])
     file = load_vehicle(vehicle)
+    if dead:
+        from rotorfault.analysis.relaxed_hover import relaxed_hover, relaxed_lines
+        from rotorfault.analysis.vehicle_settings import vehicle_with
+
+        craft = vehicle_with(file, settings).vehicle
+        say("\n".join(relaxed_lines(relaxed_hover(craft, dead), craft)))
+        return
     loss = parse_losses(losses or [], len(file.rotor))
     say(trim_report(vehicle, controller, preset, period, loss, settings=settings).text())

@@ -136,6 +136,17 @@ def logarithm(code: Code, x: str) -> str:
     return code.fma(e, code.constant(_LN2[0]), code.fma(s, code.constant(2.0), tail))
 
 
+def logarithm_anywhere(code: Code, x: str) -> str:
+    """Natural logarithm of any number, NaN at zero and below; subnormal numbers count as zero."""
+    inside, infinite = (
+        code.compare("oge", x, code.constant(2.0**-1022)),
+        code.compare("oeq", x, code.constant(math.inf)),
+    )
+    outside = code.select(infinite, x, code.constant(math.nan))
+    finite = code.compare("olt", x, code.constant(math.inf))
+    return code.select(finite, code.select(inside, logarithm(code, x), outside), outside)
+
+
 def exponential(code: Code, x: str) -> str:
     """exp x."""
     # Beyond these the result is infinite, or zero, anyway; the multiple of ln 2 must stay small.

@@ -20,6 +20,7 @@ _FUNCTIONS: dict[str, Callable[..., str]] = {
     "asin": elementary.arc_sine,
     "atan2": elementary.arc_tangent,
     "exp": elementary.exponential,
+    "log": elementary.logarithm_anywhere,
     "tanh": elementary.hyperbolic_tangent,
 }
 

@@ -31,13 +31,14 @@ from rotorfault.engine.structure import skeleton
 from rotorfault.engine.trace import Tape, Term
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, statics, unflatten
+from rotorfault.model.likeness import has
 from rotorfault.model.signals import Command
 
 SEED = ("seed", "index")  # rows after the parameters
 # Parameters of which 0 means that their part of the model is not there. It then costs nothing: the numbers are the
 # same to the last bit.
 ABSENT_AT_ZERO = frozenset({"vehicle.rotor_reaction", "belief.rotor_reaction"})
-ABSENT_BELOW = ("vehicle.air.", "belief.air.")
+ABSENT_BELOW = ("vehicle.air.", "belief.air.", "vehicle.rotor_z.", "belief.rotor_z.")
 MOST_IN_ONE = 2  # integration steps that one piece of straight code holds
 
 
@@ -57,6 +58,7 @@ class SameForAll(NamedTuple):
     absent: tuple[int, ...] = ()  # rows of the parameters that switch a part of the model off
     told: tuple[Any, ...] = ()  # what the parameters say without numbers
     numbers: int = 0  # of the parameters
+    has: tuple[bool, ...] = ()  # which records of a vehicle are there, in truth and in belief
 
 
 class Section(NamedTuple):
@@ -91,7 +93,11 @@ def same_for_all(batch: Batch) -> SameForAll:
         for row, (name, value) in enumerate(zip(names, values, strict=True))
         if (name in ABSENT_AT_ZERO or name.startswith(ABSENT_BELOW)) and not np.any(value)
     )
-    return SameForAll(absent, tuple(statics(batch.parameters)), len(values))
+    return SameForAll(absent, tuple(statics(batch.parameters)), len(values), _has(batch))
+
+
+def _has(batch: Batch) -> tuple[bool, ...]:
+    return (*has(batch.parameters.vehicle), *has(batch.parameters.belief))
 
 
 def trace(batch: Batch, same: SameForAll = SameForAll()) -> Traced:  # noqa: B008
@@ -172,7 +178,7 @@ def same_code(one: Batch, *others: Batch) -> bool:
     for other in others:
         if statics(other.parameters) != statics(one.parameters):
             return False
-        if len(flatten(other.parameters)) != len(flatten(one.parameters)):
+        if len(flatten(other.parameters)) != len(flatten(one.parameters)) or _has(other) != _has(one):
             return False
         other_words, other_numbers = skeleton(other.loop)
         if other_words != words or any(

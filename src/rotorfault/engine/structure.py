@@ -27,7 +27,8 @@ def skeleton(loop: ClosedLoop) -> tuple[tuple[str, ...], tuple[float, ...]]:
     numbers: list[float] = []
     parts = [f"{slot.name}: {describe(part, numbers)}" for slot, part in loop.each()]
     reference = f"{loop.reference.__module__}.{loop.reference.__qualname__}"
-    return (*parts, reference, f"{loop.plant.substeps} substeps, {loop.rotors} rotors"), tuple(numbers)
+    supply = f"battery {loop.battery}, compensated {loop.compensates}"
+    return (*parts, reference, f"{loop.plant.substeps} substeps, {loop.rotors} rotors", supply), tuple(numbers)
 
 
 def foreign(loop: ClosedLoop) -> bool:

@@ -24,6 +24,7 @@ from rotorfault.engine.batch import Batch, Recording, Watch, no_watch
 from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, leaf_names, unflatten
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.motion import lag_bandwidth
 from rotorfault.model.signals import Command
 from rotorfault.plant.faults import RotorFault
 from rotorfault.plant.plant import Held, Plant, PlantParameters, PlantState
@@ -56,6 +57,8 @@ def fly_taylor(batch: Batch, watch: Watch = no_watch, tolerance: float = TOLERAN
     plant = batch.loop.plant
     if plant.ground is not None:
         raise InputError("ground: contact is not smooth, so Taylor series cannot serve; allowed: a flight without it")
+    if batch.loop.battery:
+        raise InputError("start.charge: power is held over integration steps, of which Taylor series have none")
     # A wrapped plant, not a second loop: whatever else happens in a sampling period stays as it is.
     wrapped = cast(Plant, _TaylorPlant(plant, batch, tolerance))
     return python.run(batch._replace(loop=batch.loop.with_plant(wrapped)), watch)
@@ -79,13 +82,14 @@ class _TaylorPlant:
             plant.fault(0.0, memory, parameters),
             memory,
             parameters,
+            self._bandwidth(state.rotors, PerRotor.all(0.0, batch.loop.rotors), parameters),
         )
         x = hy.make_vars(*(name.replace(".", "_") for name in leaf_names(motion)))
         body, rotors = unflatten(motion, x)
-        numbers: tuple[Command, RotorFault, Held, PlantParameters] = unflatten(
+        numbers: tuple[Command, RotorFault, Held, PlantParameters, Scalar] = unflatten(
             held, [hy.par[i] for i in range(len(flatten(held)))]
         )
-        command, fault, memory, parameters = numbers
+        command, fault, memory, parameters, bandwidth = numbers
         body_dot = plant.derivative(
             body,
             plant.forcing(
@@ -94,13 +98,17 @@ class _TaylorPlant:
             command,
             parameters,
         )
-        dot = (body_dot, lag_derivative(parameters.vehicle, rotors, command.thrust))
+        dot = (body_dot, lag_derivative(bandwidth, rotors, command.thrust))
         right = [hy.expression(e) if isinstance(e, float) else e for e in flatten(dot)]
         self._integrator = hy.taylor_adaptive(list(zip(x, right, strict=True)), [0.0] * len(x), tol=tolerance)
         self._reached = hy.taylor_outcome.time_limit
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._plant, name)
+
+    @staticmethod
+    def _bandwidth(output: PerRotor, limited: PerRotor, parameters: PlantParameters) -> PerRotor | Scalar:
+        return lag_bandwidth(parameters.vehicle, output, limited)
 
     def step(
         self,
@@ -114,7 +122,10 @@ class _TaylorPlant:
         """State one sampling period later; see `Plant.step`."""
         plant, taylor = self._plant, self._integrator
         fault = plant.fault(time, held, parameters)
-        values = (plant.limited(command, parameters), fault, held, parameters)
+        limited = plant.limited(command, parameters)
+        # Whether thrust rises or falls stays as it is for the whole period.
+        bandwidth = self._bandwidth(state.rotors, limited.thrust, parameters)
+        values = (limited, fault, held, parameters, bandwidth)
         taylor.pars[:] = flatten(values)[: len(taylor.pars)]  # it keeps them up to the last that the motion needs
         before = plant.residual_speed(state.rotors, fault, parameters)
         taylor.state[:] = flatten((plant.stopped(state.body, before, parameters), state.rotors))

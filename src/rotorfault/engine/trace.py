@@ -37,6 +37,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     "asin": scalar.asin,
     "atan2": scalar.atan2,
     "exp": scalar.exp,
+    "log": scalar.log,
     "tanh": scalar.tanh,
     "round": scalar.nearest,
 }

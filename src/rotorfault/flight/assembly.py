@@ -25,9 +25,9 @@ from rotorfault.loop.scores import scoring_parameters
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.model.block import Context, Record
+from rotorfault.model.likeness import alike
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.slot import Slot
-from rotorfault.model.vehicle import in_air
 from rotorfault.plant.ground import GROUND
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
@@ -156,7 +156,16 @@ def stacked(template: R, records: Sequence[R]) -> R:
 def build(scenario: Scenario, own: Own | None = None) -> ClosedLoop:
     """The parts of a scenario put together; see `assemble`."""
     telemetry = source_of(scenario, own or {}).Telemetry
-    return ClosedLoop(parts_of(scenario, own or {}), scenario.substeps, telemetry, len(scenario.vehicle.rotor))
+    rotors = scenario.vehicle.rotor
+    return ClosedLoop(
+        parts_of(scenario, own or {}),
+        scenario.substeps,
+        telemetry,
+        len(rotors),
+        tilted=any(rotor.axis is not None for rotor in rotors),
+        battery=scenario.start.charge is not None,
+        compensates=scenario.voltage_compensation,
+    )
 
 
 def parts_of(scenario: Scenario, own: Own) -> dict[Slot[Any], AnyBlock | tuple[AnyBlock, ...]]:
@@ -264,11 +273,8 @@ class _Assembly:
                 about = f"flight {self.flights[np.argmax(inverse == number)]}"
                 true = true_vehicle(vehicle, mismatch[0], self.scenario.grid, about) if mismatch else vehicle.vehicle
                 made.append(Context(true, period))
-            if any(one.vehicle.air for one in made):
-                made = [one._replace(vehicle=in_air(one.vehicle)) for one in made]
-            # One loop for all: what has a closed form for some of them only is not used for any.
-            if any(context.vehicle.pairs != made[0].vehicle.pairs for context in made):
-                made = [context._replace(vehicle=context.vehicle._replace(pairs=())) for context in made]
+            vehicles_ = alike([one.vehicle for one in made])  # one loop for all
+            made = [one._replace(vehicle=vehicle) for one, vehicle in zip(made, vehicles_, strict=True)]
             self._told[truth] = made, inverse
         return self._told[truth]
 
@@ -309,7 +315,7 @@ class _Assembly:
         made = []
         for numbers, flight in zip(values.T.tolist(), first, strict=True):
             changes = dict(zip(keys, numbers, strict=True))
-            tables = {field: _copied(self._tables[field])}
+            tables = {"vehicle": self._tables["vehicle"]} | {field: _copied(self._tables[field])}
             override_all(tables, changes)
             try:
                 # What is in a checked scenario was allowed when it was checked.

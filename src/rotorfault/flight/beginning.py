@@ -12,13 +12,17 @@ from rotorfault.loop.closed_loop import ClosedLoop, LoopParameters, LoopState, S
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.records import flatten, record_type, unflatten
+from rotorfault.model.battery import Charge
 from rotorfault.scenario.scenario import Scenario
 
 
 def start_of(scenario: Scenario) -> Start:
     """Where a flight begins."""
     s = scenario.start
-    return Start(Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates))
+    battery = () if s.charge is None else Charge(s.charge, 0.0)
+    return Start(
+        Vec3.of(s.position), Vec3.of(s.velocity), Vec3.of(s.attitude), Vec3.of(s.body_rates), battery=battery
+    )
 
 
 def first_normals(loop: ClosedLoop, seeds: tuple[tuple[int, int], ...]) -> tuple[Any, Any]:

@@ -16,6 +16,7 @@ from rotorfault.flight.reference_rows import unflown
 from rotorfault.loop.scores import RATTLING
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.block import Context
+from rotorfault.model.motion import mean_bandwidth
 from rotorfault.model.vehicle_check import vehicle_warnings
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.plant import FAULT
@@ -145,7 +146,7 @@ def _preset(scenario: Scenario) -> Iterator[str]:
     bandwidth, vehicle = made.get("rotor_bandwidth"), scenario.vehicle
     if not isinstance(bandwidth, (int, float)) or not bandwidth > 0.0:
         return
-    here = vehicle.vehicle.rotor_bandwidth
+    here = mean_bandwidth(vehicle.vehicle)
     if FITS[0] <= here / bandwidth <= FITS[1]:
         return
     fitting = [name for name in presets(part.kind) if _fits(record(part.kind, name), here)]

@@ -27,6 +27,7 @@ from rotorfault.flight.assembly import Own, assemble, assemble_all
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.following import Follow, Following
 from rotorfault.loop.scores import ENDS
+from rotorfault.maths.geometry import spread
 from rotorfault.maths.records import unflatten
 from rotorfault.plant import PLANT
 from rotorfault.results.flight_data import FORMAT, flight_data
@@ -309,8 +310,9 @@ def _attributes(scenario: Scenario, engine: str, own: Any) -> dict[str, Any]:
         "seed": scenario.seed,
         "version": __version__,
         "versions": json.dumps(versions()),
-        "thrust_min": vehicle.thrust_min,
-        "thrust_max": vehicle.thrust_max,
+        # Of rotors that differ, the least and the greatest of all; the configuration has each.
+        "thrust_min": min(spread(vehicle.thrust_min, vehicle.rotors)),
+        "thrust_max": max(spread(vehicle.thrust_max, vehicle.rotors)),
         "threshold": float(getattr(decision, "threshold", 0.0)),
         "configuration": json.dumps(scenario.as_tables()),
     }

@@ -22,7 +22,7 @@ from rotorfault.base.number_rule import short
 from rotorfault.engine.program import same_code
 from rotorfault.flight.assembly import Group, assemble, overridden
 from rotorfault.flight.beginning import begins_alike
-from rotorfault.scenario.overrides import override
+from rotorfault.scenario.overrides import for_rotors, is_number, override
 from rotorfault.scenario.part import Part
 from rotorfault.scenario.scenario import MOST_SEED, Scenario
 from rotorfault.scenario.slots import SLOTS
@@ -167,6 +167,9 @@ def _is_numeric(scenario: Scenario, tables: dict[str, Any], key: str, column: ND
 
 def _value_at(tables: dict[str, Any], key: str) -> Any:
     here: Any = tables
-    for part in key.split("."):
+    path = key.split(".")
+    for depth, part in enumerate(path):
+        if depth == len(path) - 1 and is_number(here) and for_rotors(path[:-1]):
+            return here  # what a list of one for each rotor begins with
         here = here[int(part)] if isinstance(here, list) else here.get(part) if isinstance(here, dict) else None
     return here

@@ -26,6 +26,7 @@ from rotorfault.loop.scoring import Scoring
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.battery import Battery, Charge, Supply, at_voltage
 from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.signals import Command, Reference
@@ -80,6 +81,7 @@ class Start(NamedTuple):
     attitude: Vec3  # rad
     omega_B: Vec3  # rad/s
     normals: Any = ()  # record of standard normal numbers for `initial` of the parts that need some, by slot
+    battery: Charge | tuple[()] = ()  # empty where the voltage is constant
 
 
 @final
@@ -96,6 +98,12 @@ class ClosedLoop:
         Signals of the reference's own.
     rotors : int
         Of the vehicle.
+    tilted : bool
+        Whether any of them is tilted.
+    battery : bool
+        Whether the voltage is that of the vehicle's battery, and not constant.
+    compensates : bool
+        Whether the autopilot makes up for it.
 
     Attributes
     ----------
@@ -107,8 +115,17 @@ class ClosedLoop:
         parts = ", ".join(f"{slot.name} {type(part).__name__}" for slot, part in self.each())
         return cut(f"<closed loop of {parts}>", LONGEST)
 
-    def __init__(self, parts: Parts, substeps: int, reference: type[Record] = Nothing, rotors: int = 4) -> None:
-        self.parts, self.rotors = dict(parts), rotors
+    def __init__(
+        self,
+        parts: Parts,
+        substeps: int,
+        reference: type[Record] = Nothing,
+        rotors: int = 4,
+        tilted: bool = False,
+        battery: bool = False,
+        compensates: bool = False,
+    ) -> None:
+        self.parts, self.rotors, self.battery, self.compensates = dict(parts), rotors, battery, compensates
         truth = {slot: part for slot, part in self.parts.items() if slot.side == "truth"}
         self.autopilot = Autopilot(
             {slot: cast("AnyBlock", part) for slot, part in self.parts.items() if slot.side == "belief"}
@@ -127,7 +144,7 @@ class ClosedLoop:
                 telemetry[slot.name] = part.Telemetry
         response = self.maybe(ON_FAULT)
         lands = response is not None and response.lands
-        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry, rotors)
+        self.recorder = Recorder(self.plant.ground is not None, lands, telemetry, rotors, tilted, battery)
         self.layout = self.recorder.layout
         self.scoring = Scoring(
             ground=self.plant.ground is not None,
@@ -135,6 +152,7 @@ class ClosedLoop:
             faulty=tuple(fault.rotor for fault in self.plant.faults),
             signals=self.layout.signals,
             rotors=rotors,
+            upside_down=self.plant.model.upside_down,
         )
 
     def __getitem__(self, slot: Slot[B]) -> B:
@@ -196,7 +214,7 @@ class ClosedLoop:
             if part.normals or part.first_normals
         }
         zeros_of = record_type("FirstNormals", tuple(widths))(*((0.0,) * width for width in widths.values()))
-        return Start(p_W, zeros(), zeros(), zeros(), zeros_of)
+        return Start(p_W, zeros(), zeros(), zeros(), zeros_of, Charge(1.0, 0.0) if self.battery else ())
 
     def with_plant(self, plant: Plant) -> ClosedLoop:
         """The same loop with another integrator of the motion."""
@@ -208,7 +226,13 @@ class ClosedLoop:
         """State before the first step; rotors at the hover thrust that the autopilot believes in."""
         numbers, plant_numbers = parameters.parts, self.plant_numbers(parameters)
         plant = self.plant.initial(
-            start.p_W, start.v_W, start.attitude, start.omega_B, hover_thrust(parameters.belief), plant_numbers
+            start.p_W,
+            start.v_W,
+            start.attitude,
+            start.omega_B,
+            hover_thrust(parameters.belief),
+            plant_numbers,
+            start.battery,
         )
         at_start = TimeInputs(0.0, _normals(start.normals, "wind"))
         held = Held(
@@ -270,7 +294,15 @@ class ClosedLoop:
             state.scores, recorded, parameters.scoring, self.onsets(numbers), state.steps, time, dt
         )
         after = LoopState(state.plant, self._kept(held, sensors), memory, scores, state.steps + 1.0)
-        return after, command, recorded
+        return after, self._compensated(command, truth, parameters.belief), recorded
+
+    def _compensated(self, command: Command, truth: Truth, belief: Vehicle) -> Command:
+        """What is sent, with the measured voltage made up for if the autopilot does that."""
+        if not (self.compensates and isinstance(truth.supply, Supply) and isinstance(belief.battery, Battery)):
+            return command
+        reversible = belief.reversible != ()
+        sent = at_voltage(belief.battery, command.thrust, belief.thrust_max, 1.0 / truth.supply.share, reversible)
+        return command._replace(thrust=sent)
 
     def limited(self, command: Command, parameters: LoopParameters) -> Command:
         """The command within the true rotor limits."""

@@ -10,10 +10,11 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple, final
 
 from rotorfault.autopilot.autopilot import AutopilotReport
-from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.records import record_type
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.battery import Supply
 from rotorfault.model.block import Nothing, Record
 from rotorfault.model.signals import Command
 from rotorfault.model.telemetry import NO_FRAME, RPY, B, Layout, Q, W, signals_of
@@ -64,6 +65,20 @@ class GroundSignals(NamedTuple):
     ground_force: Annotated[Scalar, Q("N", W, "true upward force of the ground")]
 
 
+class TiltSignals(NamedTuple):
+    """What flights of tilted rotors record."""
+
+    lateral_force: Annotated[Vec3, Q("N", B, "true force of the rotors across body z; a disturbance to position")]
+
+
+class BatterySignals(NamedTuple):
+    """What flights record whose voltage is that of a battery."""
+
+    battery_voltage: Annotated[Scalar, Q("V", NO_FRAME, "true voltage of the battery")]
+    battery_current: Annotated[Scalar, Q("A", NO_FRAME, "true current from the battery")]
+    battery_charge: Annotated[Scalar, Q("1", NO_FRAME, "true charge of the battery, 1 full")]
+
+
 class LandingSignals(NamedTuple):
     """What flights record whose response to a fault may land."""
 
@@ -84,6 +99,10 @@ class Recorder:
         What each part records, by slot.
     rotors : int
         Of the vehicle.
+    tilted : bool
+        Whether any of them is tilted.
+    battery : bool
+        Whether the voltage is that of a battery.
 
     Attributes
     ----------
@@ -91,12 +110,22 @@ class Recorder:
         Names, units and rows of all signals.
     """
 
-    def __init__(self, ground: bool, lands: bool, parts: dict[str, type[Record]], rotors: int = 4) -> None:
-        self._ground, self._lands = ground, lands
+    def __init__(
+        self,
+        ground: bool,
+        lands: bool,
+        parts: dict[str, type[Record]],
+        rotors: int = 4,
+        tilted: bool = False,
+        battery: bool = False,
+    ) -> None:
+        self._ground, self._lands, self._tilted, self._battery = ground, lands, tilted, battery
         self._parts = {name: kind for name, kind in parts.items() if kind is not Nothing}
         common: list[type[Record]] = [LoopSignals]
         common += [GroundSignals] if ground else []
         common += [LandingSignals] if lands else []
+        common += [TiltSignals] if tilted else []
+        common += [BatterySignals] if battery else []
         signals = [signal for kind in common for signal in signals_of(kind)]
         # A record of their own: a slot may have the name of one of the loop's signals, as the wind has.
         self._own = record_type("PartSignals", tuple(self._parts))
@@ -156,4 +185,8 @@ class Recorder:
         )
         more = [truth.ground_force] if self._ground else []
         more += [decision.stage] if self._lands else []
+        more += [truth.lateral_B if isinstance(truth.lateral_B, Vec3) else zeros()] if self._tilted else []
+        if self._battery:
+            assert isinstance(truth.supply, Supply)
+            more += [truth.supply.voltage, truth.supply.current, truth.charge]
         return self._record(*own, *more, self._own(*(telemetry[name] for name in self._parts)))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, maximum
 
@@ -55,8 +55,8 @@ class ScoringParameters(NamedTuple):
     settle_band: Vec3  # m: error within which an axis counts as settled
     track_band: Vec3  # m: root mean square error within which it counts as tracked
     half: Scalar  # number of the step with which the last half begins
-    command_low: Scalar  # N: commands at or below count as saturated
-    command_high: Scalar  # N: commands at or above do
+    command_low: PerRotor | Scalar  # N: commands at or below count as saturated; of each rotor where they differ
+    command_high: PerRotor | Scalar  # N: commands at or above do
     bottom: Scalar  # m: height below which the vehicle is in the ground, not on it; unread without ground
     touch: Scalar  # N: upward force of the ground with which it touches; unread without ground
     hover: Scalar  # N: command of a rotor in hover
@@ -124,6 +124,7 @@ class Scores(NamedTuple):
     touched: Scalar  # 1 from the touch-down on
     gentle: Scalar  # whether the last instant was gentle enough for a touch-down
     rest: Scalar  # s at rest with rotors stopped
+    inverted: Scalar | tuple[()]  # s: for how long the tilt has been beyond 90 degrees; empty where it may not be
     detections: tuple[Detection, ...]  # one for each rotor that a fault hits, in the order of their numbers
     landing: Landing | tuple[()]  # where a landing may happen
     signals: Any  # record of what is counted of signals, by name
@@ -171,8 +172,8 @@ def bands(reference: NDArray[np.float64], start: NDArray[np.float64], share: flo
 
 def scoring_parameters(
     position: NDArray[np.float64],
-    thrust_min: Scalar,
-    thrust_max: Scalar,
+    thrust_min: PerRotor | Scalar,
+    thrust_max: PerRotor | Scalar,
     bottom: Scalar,
     weight: Scalar,
     hover: Scalar,
@@ -184,7 +185,7 @@ def scoring_parameters(
     ----------
     position : ndarray, shape (..., 3)
         Where it begins, in m.
-    thrust_min, thrust_max : scalar, N
+    thrust_min, thrust_max : scalar or PerRotor, N
         Limits of a rotor's command, as the autopilot believes.
     bottom : scalar, m
         Height below which the vehicle is in the ground; unread where there is none.
@@ -195,7 +196,7 @@ def scoring_parameters(
     reference : ndarray, shape (steps, 3 or more)
         Its first three columns are positions in m.
     """
-    margin = AT_LIMIT * maximum(1.0, thrust_max)
+    margin = AT_LIMIT * per_rotor(lambda most: maximum(1.0, most), thrust_max)
     settle, track = (np.moveaxis(bands(reference[:, :3], position, share), -1, 0) for share in (SETTLED, TRACKED))
     return ScoringParameters(
         settle_band=Vec3.of(settle),

@@ -4,7 +4,8 @@ Pure functions on scalars, so that every engine counts alike, a batch of a hundr
 and a flight has one set of numbers whatever of it is recorded and how finely.
 
 - *Outcome*: ``diverged`` (a number of the true state, of the commands, of the cost or of what parts record of
-  themselves is not finite, or it is further than 10 km away), ``tumbled`` (tilt beyond 90 degrees) or ``ground``
+  themselves is not finite, or it is further than 10 km away), ``tumbled`` (tilt beyond 90 degrees for half a second
+  on end; at once in a model of the body that fails there) or ``ground``
   (crash: touched the ground faster than 1 m/s down or 0.5 m/s sideways, or tilted beyond 15 degrees, or sank into it
   by the length of its legs) end a flight; so does ``landed`` (touched it more gently than that in a landing, and
   stood there with rotors stopped for 0.5 s). It touches where the ground pushes it up with 1 % of its weight or more.
@@ -40,6 +41,7 @@ import math
 from typing import Any, final
 
 from rotorfault.loop.cost import attitude_error, cost_rate, each, heading_error
+from rotorfault.loop.landing import horizontal, landing_after, touching_now
 from rotorfault.loop.scores import (
     COST_INPUT,
     FAR,
@@ -54,7 +56,7 @@ from rotorfault.loop.scores import (
     Scores,
     ScoringParameters,
 )
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor, zeros
 from rotorfault.maths.records import flatten, record_type, select_record
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import (
@@ -73,7 +75,6 @@ from rotorfault.maths.scalar import (
     minimum,
     negated,
     select,
-    sqrt,
 )
 from rotorfault.model.telemetry import Signal
 from rotorfault.plant.faults import since
@@ -95,6 +96,8 @@ class Scoring:
         What is recorded; those with a score are counted.
     rotors : int
         Of the vehicle.
+    upside_down : float
+        For how long it may be tilted beyond 90 degrees in s, before it has tumbled.
     """
 
     def __init__(
@@ -104,8 +107,10 @@ class Scoring:
         faulty: tuple[int, ...] = (),
         signals: tuple[Signal, ...] = (),
         rotors: int = 4,
+        upside_down: float = 0.0,
     ) -> None:
         self.ground, self.lands, self.faulty, self.count_of_rotors = ground, lands, faulty, rotors
+        self.upside_down = upside_down
         self.rotors = tuple(sorted(set(faulty)))
         self.counted = tuple(signal for signal in signals if signal.quantity.score is not None)
         self.has_cost = any(signal.name == COST_INPUT for signal in signals)
@@ -122,7 +127,7 @@ class Scoring:
             cost=0.0, cost_first=0.0, cost_last=0.0, cosine_least=1.0, lowest=FAR, away=0.0, drop=0.0,
             variation=0.0, command=each_rotor, saturated=0.0, given_up=none, flags=each_rotor,
             false_alarms=0.0,
-            touched=0.0, gentle=1.0, rest=0.0,
+            touched=0.0, gentle=1.0, rest=0.0, inverted=0.0 if self.upside_down > 0.0 else (),
             detections=tuple(Detection(-1.0, 0.0, 0.0, 0.0, 0.0) for _ in self.rotors),
             landing=landing,
             signals=self._counts(*(0.0 for _ in self.counted)),
@@ -163,20 +168,23 @@ class Scoring:
         numbers = _is_finite(signals, new)
         gentle, touched, rest = 1.0, 0.0, 0.0
         # Written as "not inside", so that NaN counts as outside.
-        upright = greater(cosine, 0.0)
+        upright, inverted = greater(cosine, 0.0), scores.inverted
+        if not isinstance(inverted, tuple):
+            inverted = select(upright, 0.0, inverted + dt)
+            upright = less(inverted, self.upside_down)
         standing: Scalar = 1.0
         if self.ground:
             stage = signals.landing_stage if self.lands else 0.0
-            touching = _touching(signals, parameters)
-            landing = greater(stage, 0.5)
+            touching = touching_now(signals, parameters)
+            descends = greater(stage, 0.5)
             gentle = both(
-                less_equal(-signals.velocity.z, SPEED_MAX), less_equal(_horizontal(signals.velocity), SLIDE_MAX)
+                less_equal(-signals.velocity.z, SPEED_MAX), less_equal(horizontal(signals.velocity), SLIDE_MAX)
             )
             # Contact may have braked it already: the instant before counts as well.
             soft = both(both(gentle, scores.gentle), greater_equal(cosine, math.cos(TILT_MAX)))
             above = greater_equal(signals.position.z, parameters.bottom)
             standing = both(above, negated(both(touching, negated(soft))))
-            touched = either(scores.touched, both(landing, touching))
+            touched = either(scores.touched, both(descends, touching))
             resting = both(touching, greater(stage, 1.5))
             # Counted from the first instant at rest, which itself adds nothing.
             rest = select(resting, scores.rest + dt, 0.0)
@@ -197,7 +205,8 @@ class Scoring:
                 velocity=signals.velocity,
             )
             if self.lands:
-                ending = ending._replace(landing=self._land(scores, signals, parameters, begun, time))
+                landing = landing_after(scores, signals, parameters, any_of(begun.values()), time)
+                ending = ending._replace(landing=landing)
             after = select_record(counted, ending, after)
         return after._replace(
             over=select(flying, code, scores.over),
@@ -205,6 +214,7 @@ class Scoring:
             touched=select(flying, touched, scores.touched),
             gentle=gentle,
             rest=rest,
+            inverted=inverted,
         )
 
     def _begun(self, onsets: tuple[Scalar, ...], time: Scalar) -> dict[int, Scalar]:
@@ -242,9 +252,8 @@ class Scoring:
         first = less(step, 0.5)
         command = signals.thrust_command
         changes = command.map(lambda new, old: absolute(new - old), scores.command)
-        at_limit = command.map(
-            lambda c: either(less_equal(c, parameters.command_low), greater_equal(c, parameters.command_high))
-        )
+        low, high = parameters.command_low, parameters.command_high
+        at_limit = per_rotor(lambda c, a, b: either(less_equal(c, a), greater_equal(c, b)), command, low, high)
         raised = signals.fault_flag.map(lambda now, before: both(greater(now, 0.5), less(before, 0.5)), scores.flags)
         false = [
             both(rises, negated(begun[rotor])) if rotor in begun else rises
@@ -340,34 +349,6 @@ class Scoring:
             largest = maximum(largest, leaf)
         return select(first, largest, maximum(old, largest))
 
-    def _land(
-        self, scores: Scores, signals: Any, parameters: ScoringParameters, begun: dict[int, Scalar], time: Scalar
-    ) -> Landing:
-        """What is known of a landing after this instant."""
-        old: Any = scores.landing
-        stage = signals.landing_stage
-        landing, stopped = greater(stage, 0.5), greater(stage, 1.5)
-        touching = both(landing, _touching(signals, parameters))
-        touches = both(touching, less(old.touched, -0.5))
-        struck = any_of(begun.values())
-        starts = both(landing, less(old.begun, -0.5))
-        # The first instant of a fault, or of a landing before any.
-        here = either(both(struck, negated(old.struck)), both(starts, negated(struck)))
-        origin = select_record(here, signals.position, old.origin_W)
-        away = signals.position - origin
-        return Landing(
-            begun=select(starts, time, old.begun),
-            stopped=select(both(stopped, less(old.stopped, -0.5)), time, old.stopped),
-            touched=select(touches, time, old.touched),
-            origin_W=origin,
-            struck=struck,
-            distance=select(touches, _horizontal(away), old.distance),
-            # Of the instant before: the last one in the air.
-            speed=select(touches, -scores.velocity.z, old.speed),
-            slide=select(touches, _horizontal(scores.velocity), old.slide),
-            cosine=select(touches, scores.attitude.z_axis().z, old.cosine),
-        )
-
 
 def _is_finite(signals: Any, new: Scores) -> Scalar:
     """1 where every number of the true state, of commands, of the cost and of what parts tell of themselves is."""
@@ -381,11 +362,6 @@ def _is_finite(signals: Any, new: Scores) -> Scalar:
     return is_finite(total)
 
 
-def _touching(signals: Any, parameters: ScoringParameters) -> Scalar:
-    """1 where the vehicle touches the ground so that it can be felt, or where nobody knows."""
-    return negated(less(signals.ground_force, parameters.touch))
-
-
 def _inside(v: Vec3, limit: float) -> Scalar:
     """1 where every component is within a limit, which counts as inside."""
     x, y, z = (less_equal(absolute(component), limit) for component in v)
@@ -394,7 +370,3 @@ def _inside(v: Vec3, limit: float) -> Scalar:
 
 def _within(v: Vec3, limit: float) -> Scalar:
     return both(both(less(absolute(v.x), limit), less(absolute(v.y), limit)), less(absolute(v.z), limit))
-
-
-def _horizontal(v: Vec3) -> Scalar:
-    return sqrt(v.x * v.x + v.y * v.y)

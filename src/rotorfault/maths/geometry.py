@@ -345,6 +345,32 @@ class PerRotor(Value):
         return values[0]
 
 
+def per_rotor(function: Callable[..., Scalar], *values: Scalar) -> Scalar:
+    """Apply ``function(*values)`` rotor by rotor where any value is a `PerRotor`, else once.
+
+    Parameters
+    ----------
+    function : callable
+        Of scalars.
+    *values : scalar or PerRotor
+        A scalar counts for every rotor.
+
+    Returns
+    -------
+    scalar or PerRotor
+    """
+    rotors = next((value for value in values if isinstance(value, PerRotor)), None)
+    if rotors is None:
+        return function(*values)
+    first, *others = (spread(value, len(rotors)) for value in values)
+    return first.map(function, *others)
+
+
+def spread(value: PerRotor | Scalar, rotors: int) -> PerRotor:
+    """A number for each of so many rotors; one scalar is that of all."""
+    return value if isinstance(value, PerRotor) else PerRotor.all(value, rotors)
+
+
 def zeros() -> Vec3:
     """The zero vector."""
     return Vec3(0.0, 0.0, 0.0)

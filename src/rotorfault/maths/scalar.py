@@ -30,6 +30,7 @@ Scalar: TypeAlias = Any
 """A float, a NumPy array, a term, a heyoka expression or a CasADi SX: whatever one engine computes with."""
 
 NAN = math.nan
+_ONE_ARGUMENT = ("exp", "log", "sin", "cos", "tan", "asin", "tanh")
 
 
 class _Derived:
@@ -88,8 +89,7 @@ class _Floats:
         return math.asin(x) if -1.0 <= x <= 1.0 else NAN
 
     sin, cos, tan = (staticmethod(_of_angle(function)) for function in (math.sin, math.cos, math.tan))
-    atan2 = staticmethod(math.atan2)
-    tanh = staticmethod(math.tanh)
+    atan2, tanh, log = staticmethod(math.atan2), staticmethod(math.tanh), staticmethod(math.log)
 
     @staticmethod
     def nearest(x: float) -> float:
@@ -111,7 +111,7 @@ class _Floats:
 class _Arrays(_Derived):
     """NumPy arrays, one element per flight."""
 
-    sqrt, exp, sin, cos, tan = np.sqrt, np.exp, np.sin, np.cos, np.tan
+    sqrt, exp, log, sin, cos, tan = np.sqrt, np.exp, np.log, np.sin, np.cos, np.tan
     asin, atan2, tanh, nearest = np.arcsin, np.arctan2, np.tanh, np.rint
     minimum, maximum, absolute = np.minimum, np.maximum, np.absolute  # type: ignore[assignment]
 
@@ -135,16 +135,13 @@ class _Heyoka(_Derived):
         self._expression = module.expression
         self._lt, self._lte, self._select = module.lt, module.lte, module.select
         self._atan2, self._cos, self._sin = module.atan2, module.cos, module.sin
-        self._one_argument = {name: getattr(module, name) for name in ("exp", "sin", "cos", "tan", "asin", "tanh")}
-        self._sqrt = module.sqrt
+        self._one_argument = {name: getattr(module, name) for name in _ONE_ARGUMENT}
+        self.sqrt = module.sqrt
         self._one = module.expression(1.0)
 
     def __getattr__(self, name: str) -> Any:
         # Plain one-argument functions need no adaptation: dispatch has seen that the argument is an expression.
         return self._one_argument[name]
-
-    def sqrt(self, x: Scalar) -> Scalar:
-        return self._sqrt(x)
 
     def nearest(self, x: Scalar) -> Scalar:
         # There is no rounding: the distance from the nearest whole number is an angle.
@@ -179,8 +176,8 @@ class _Casadi(_Derived):
 
     def __init__(self, module: ModuleType) -> None:
         self._module = module
-        self.sqrt, self.exp, self.sin, self.cos = module.sqrt, module.exp, module.sin, module.cos
-        self.tan, self.asin, self.atan2, self.tanh = module.tan, module.asin, module.atan2, module.tanh
+        for name in (*_ONE_ARGUMENT, "sqrt", "atan2"):
+            setattr(self, name, getattr(module, name))
         self.less, self.less_equal, self.select = module.lt, module.le, module.if_else
 
     def nearest(self, x: Scalar) -> Scalar:
@@ -252,6 +249,12 @@ def reciprocal(x: Scalar) -> Scalar:
 def exp(x: Scalar) -> Scalar:
     """Exponential function."""
     return _of(x).exp(x)
+
+
+def log(x: Scalar) -> Scalar:
+    """Natural logarithm; NaN at zero and below."""
+    f = _of(x)
+    return f.log(f.select(f.less(0.0, x), x, NAN))
 
 
 def sin(x: Scalar) -> Scalar:

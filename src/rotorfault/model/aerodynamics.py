@@ -19,6 +19,7 @@ how fast it spins when yaw is given up.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from rotorfault.base.one_line import record_line
@@ -29,7 +30,6 @@ from rotorfault.maths.scalar import Scalar, absolute
 class Aerodynamics(NamedTuple):
     """Coefficients; 0 for what a vehicle has not got."""
 
-    rotor_z: PerRotor  # m: rotors above the centre of mass
     rotor_drag: Scalar  # kg/rad: force across the axis per rotor speed and airspeed
     inflow: Scalar  # kg/rad: thrust lost per rotor speed and speed along the axis
     translational_lift: Scalar  # kg/m: thrust won per squared airspeed across the axis
@@ -42,32 +42,40 @@ class Aerodynamics(NamedTuple):
         return record_line(self)
 
 
-def still_air(rotors: int) -> Aerodynamics:
-    """Coefficients of a vehicle with so many rotors on which the air does nothing."""
-    return Aerodynamics(PerRotor.all(0.0, rotors), 0.0, 0.0, 0.0, 0.0, zeros(), zeros(), zeros())
+def still_air() -> Aerodynamics:
+    """Coefficients of a vehicle on which the air does nothing."""
+    return Aerodynamics(0.0, 0.0, 0.0, 0.0, zeros(), zeros(), zeros())
 
 
 def air_wrench(
-    air: Aerodynamics, rotor_x: PerRotor, rotor_y: PerRotor, speeds: PerRotor, airspeed_B: Vec3, omega_B: Vec3
+    air: Aerodynamics,
+    places: Sequence[Vec3],
+    speeds: PerRotor,
+    airspeed_B: Vec3,
+    omega_B: Vec3,
+    gusts_B: Sequence[Vec3] = (),
 ) -> tuple[Vec3, Vec3]:
     """Force in N and torque in N m of the air on the vehicle, body axes.
 
     Parameters
     ----------
     air : Aerodynamics
-    rotor_x, rotor_y : PerRotor, m
-        Where the rotors are, forward and left of the centre of mass.
+    places : sequence of Vec3, m
+        Where the rotors are, from the centre of mass, body axes.
     speeds : PerRotor, rad/s
         Of the rotors; those that are reversed count by their size.
     airspeed_B : Vec3, m/s
         Velocity of the vehicle against the air, body axes.
     omega_B : Vec3, rad/s
         Body rates.
+    gusts_B : sequence of Vec3, m/s
+        By how much faster the air is at each rotor than at the centre of mass, body axes; empty for not at all.
     """
     force, torque = zeros(), zeros()
-    for x, y, z, speed in zip(rotor_x, rotor_y, air.rotor_z, speeds, strict=True):
-        place, size = Vec3(x, y, z), absolute(speed)
+    for i, (place, speed) in enumerate(zip(places, speeds, strict=True)):
+        size = absolute(speed)
         v = airspeed_B + omega_B.cross(place)
+        v = v - gusts_B[i] if gusts_B else v
         lift = air.translational_lift * (v.x * v.x + v.y * v.y)
         pull = Vec3(-air.rotor_drag * size * v.x, -air.rotor_drag * size * v.y, lift - air.inflow * size * v.z)
         flap = air.flapping * size

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
-from rotorfault.model.effectiveness import effectiveness, pseudo_inverse
+from rotorfault.model.effectiveness import WrenchRows, effectiveness, lateral_rows, pseudo_inverse
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Opposite, Vehicle
 
@@ -107,11 +107,12 @@ def rotor_thrusts(pairs: PairDemand) -> PerRotor:
 def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
     """Rotor thrusts in N that give a wrench exactly, without regard to limits: (36), corrected.
 
-    Of more than four rotors, of all thrusts that give it those with the least sum of squares.
+    Of more than four rotors, of all thrusts that give it those with the least sum of squares; of tilted ones, with
+    little lateral force besides.
     """
     if vehicle.pairs != ():
         return from_pairs(vehicle, rotor_thrusts(pair_demand(vehicle, wrench)))
-    return pseudo_inverse(effectiveness(vehicle)).times(wrench)
+    return _inverse(vehicle).times(wrench)
 
 
 def hover_thrust(vehicle: Vehicle) -> PerRotor:
@@ -119,5 +120,9 @@ def hover_thrust(vehicle: Vehicle) -> PerRotor:
     weight = vehicle.mass * vehicle.gravity
     if vehicle.pairs != ():
         return PerRotor.all(weight / 4.0)
-    thrust: PerRotor = pseudo_inverse(effectiveness(vehicle)).thrust * weight
+    thrust: PerRotor = _inverse(vehicle).thrust * weight
     return thrust
+
+
+def _inverse(vehicle: Vehicle) -> WrenchRows:
+    return pseudo_inverse(effectiveness(vehicle), lateral_rows(vehicle))

@@ -94,14 +94,26 @@ class Motion(NamedTuple):
     v_W: Vec3  # m/s
     omega_B: Vec3  # rad/s
     axis_W: Vec3  # unit vector of the thrust
+    level_W: tuple[Vec3, Vec3] | Absent = ()  # unit vectors of body x and y, where rotors push along them
 
     def __repr__(self) -> str:
         return record_line(self)
 
 
-def motion_of(estimate: Estimate) -> Motion:
-    """The motion that is believed."""
-    return Motion(estimate.v_W, estimate.omega_B, estimate.q_WB.z_axis())
+def motion_of(estimate: Estimate, tilted: bool = False) -> Motion:
+    """The motion that is believed.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    tilted : bool
+        Whether the vehicle has tilted rotors, so that all three body axes are asked for.
+    """
+    motion = Motion(estimate.v_W, estimate.omega_B, estimate.q_WB.z_axis())
+    if not tilted:
+        return motion
+    forward_W, left_W, _ = estimate.q_WB.matrix().T.rows
+    return motion._replace(level_W=(forward_W, left_W))
 
 
 class Reference(NamedTuple):

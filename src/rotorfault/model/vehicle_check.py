@@ -18,12 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3, spread
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.signals import Wrench
-from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle import ROTOR_NUMBERS, Vehicle, rotor_speeds
 
 ANGLE = 0.5  # rad, by which the least authority turns
 TIMES = Vec3(0.5, 0.5, 2.0)  # s, about roll, pitch, yaw; our choice: a gust builds up in as much, yaw can wait
@@ -64,22 +64,27 @@ def most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:
     axis_B : Vec3
         Unit vector, body axes.
     """
-    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
     change = nominal_inverse(vehicle, Wrench(0.0, axis_B))
     # Rotors that give no torque about the axis do not limit it.
     least = 1e-9 * max(abs(c) for c in change)
-    room = [min(high - f, f - low) / abs(c) for f, c in zip(thrust, change, strict=True) if abs(c) > least]
+    rooms = _spare(vehicle, thrust)
+    room = [spare / abs(c) for spare, c in zip(rooms, change, strict=True) if abs(c) > least]
     return float(max(0.0, min(room)))
 
 
 # --------------------------------------------------------------------------------------------------------- authority
 
 
+def _spare(vehicle: Vehicle, thrust: PerRotor) -> list[float]:
+    """Thrust in N by which each rotor may change, either way, before it is at a limit; below 0 beyond it."""
+    low, high = (spread(x * vehicle.rotor_gain, vehicle.rotors) for x in (vehicle.thrust_min, vehicle.thrust_max))
+    return [float(min(most - f, f - least)) for f, least, most in zip(thrust, low, high, strict=True)]
+
+
 def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
     """Axes that can hardly be reached, each with what there is to say."""
     hover = hover_thrust(vehicle)
-    low, high = vehicle.thrust_min * vehicle.rotor_gain, vehicle.thrust_max * vehicle.rotor_gain
-    spare = min(min(float(high - f), float(f - low)) for f in hover)
+    spare = min(_spare(vehicle, hover))
     for name, key, moment, least, time, unit in zip(
         AXES, "xyz", vehicle.inertia, LEAST, TIMES, (Vec3.of(row) for row in _UNITS), strict=True
     ):
@@ -167,9 +172,21 @@ def _units(vehicle: Vehicle) -> Iterator[str]:
         # All else is judged by mass and arm, so nothing more is said.
         yield mass.line() if mass.of(v.mass) > mass.high else f"{size.line()} for x and y of the rotors"
         return
-    for proportion in (*_masses(v, arm), *_rotors(v, arm)):
+    for proportion in (*_masses(v, arm), *_each_rotor(v, arm)):
         if not proportion.fits:
             yield proportion.line()
+
+
+def _each_rotor(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+    """Numbers of the rotors; those that differ for each of them."""
+    different = [key for key in ROTOR_NUMBERS if isinstance(getattr(v, key), PerRotor)]
+    for rotor in range(v.rotors if different else 1):
+        numbers: Any = {key: getattr(v, key)[rotor] for key in different}
+        for proportion in _rotors(v._replace(**numbers), arm):
+            if proportion.key in different:
+                yield proportion._replace(key=f"{proportion.key} of rotor {rotor + 1}")
+            elif rotor == 0:
+                yield proportion
 
 
 def _masses(v: Vehicle, arm: float) -> Iterator[_Proportion]:

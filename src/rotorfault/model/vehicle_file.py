@@ -9,6 +9,13 @@
     x = { value = 0.42, unit = "m", source = "paper, (3)" }    # forward of the centre of mass
     y = { value = 0.0, unit = "m", source = "..." }            # left of it
     yaw = "+"                    # its drag torque turns the body towards positive yaw (to the left)
+    axis = { value = [0.0, 0.34, 0.94], unit = "1", source = "..." }    # optional: tilted; unit vector, body axes
+
+Rotors that differ have a list in place of one number, in the order of their tables:
+
+    thrust_max = { value = [8.1, 8.0, 7.9, 8.0], unit = "N", source = "thrust stand, each motor" }
+
+and so have thrust_coefficient, torque_ratio, thrust_min, rotor_bandwidth, rotor_bandwidth_down and rotor_gain.
 
 Units are the SI units of `rotorfault.model.vehicle.Vehicle` alone, so that no number is converted silently.
 """
@@ -16,35 +23,44 @@ Units are the SI units of `rotorfault.model.vehicle.Vehicle` alone, so that no n
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotorfault.base.bounds import require
 from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.base.one_line import cut
-from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.battery import Battery
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.quantities import (
     AirFile,
+    BatteryFile,
     Inertia,
+    Place,
+    Product,
     Quantity,
     Rotor,
-    Thrust,
+    RotorQuantity,
+    TripleQuantity,
     in_unit,
     not_negative,
     positive,
 )
-from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, Opposite, Vehicle, opposite_pairs
+from rotorfault.model.thrust_curve import STEEPEST
+from rotorfault.model.tilt import Tilt
+from rotorfault.model.vehicle import FEWEST_ROTORS, MOST_ROTORS, ROTOR_NUMBERS, Discs, Opposite, Reversible, Vehicle
+from rotorfault.model.vehicle import opposite_pairs as opposite
+from rotorfault.model.vehicle_rules import RotorSet, hover_refusal, inertia_refusal, level_refusal, reach_refusal
 
-LEAST_ROW = 1e-3  # of an axis, what is its own: with less it is another axis in disguise
+UPWARD = (0.0, 0.0, 1.0)
 
 
 class VehicleFile(Strict):
@@ -53,18 +69,32 @@ class VehicleFile(Strict):
     name: str = Field(min_length=1, description="short name, as used in scenarios")
     description: str = Field(default="", description="one line")
     mass: Annotated[Quantity, positive("kg")] = Field(description="kg, with battery")
-    inertia_x: Inertia = Field(description="kg m^2, principal moment about the forward axis")
-    inertia_y: Inertia = Field(description="kg m^2, principal moment about the left axis")
-    inertia_z: Inertia = Field(description="kg m^2, principal moment about the upward axis")
+    inertia_x: Inertia = Field(description="kg m^2, moment about the forward axis")
+    inertia_y: Inertia = Field(description="kg m^2, moment about the left axis")
+    inertia_z: Inertia = Field(description="kg m^2, moment about the upward axis")
+    inertia_xy: Product | None = Field(
+        default=None, description="kg m^2, element of the matrix: minus the integral of xy dm"
+    )
+    inertia_xz: Product | None = Field(default=None, description="kg m^2, the same for xz")
+    inertia_yz: Product | None = Field(default=None, description="kg m^2, the same for yz")
+    centre_of_mass: Place | None = Field(
+        default=None,
+        description="m, where it is in the frame of the rotors' x, y, z; at its origin if not given",
+    )
     rotor_inertia: Annotated[Quantity, not_negative("kg m^2")] = Field(description="kg m^2, one rotor on its axis")
-    thrust_coefficient: Annotated[Quantity, positive("N/(rad/s)^2")] = Field(
+    thrust_coefficient: Annotated[RotorQuantity, positive("N/(rad/s)^2")] = Field(
         description="N/(rad/s)^2, thrust per squared rotor speed"
     )
-    torque_ratio: Annotated[Quantity, positive("m")] = Field(description="m, drag torque over thrust (kappa)")
-    thrust_min: Thrust = Field(description="N, least thrust of a rotor")
-    thrust_max: Thrust = Field(description="N, greatest thrust of a rotor")
-    rotor_bandwidth: Annotated[Quantity, positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
-    rotor_gain: Annotated[Quantity, positive("1")] = Field(description="thrust per commanded thrust (k)")
+    torque_ratio: Annotated[RotorQuantity, positive("m")] = Field(description="m, drag torque over thrust (kappa)")
+    thrust_min: Annotated[RotorQuantity, in_unit("N")] = Field(
+        description="N, least thrust of a rotor; below 0 it can turn the other way"
+    )
+    thrust_max: Annotated[RotorQuantity, positive("N")] = Field(description="N, greatest thrust of a rotor")
+    rotor_bandwidth: Annotated[RotorQuantity, positive("rad/s")] = Field(description="rad/s, first-order lag: 1/tau")
+    rotor_bandwidth_down: Annotated[RotorQuantity, positive("rad/s")] | None = Field(
+        default=None, description="rad/s, the same for thrust that falls; `rotor_bandwidth` if not given"
+    )
+    rotor_gain: Annotated[RotorQuantity, positive("1")] = Field(description="thrust per commanded thrust (k)")
     linear_drag: Annotated[Quantity, not_negative("N s/m")] = Field(description="N s/m, force per airspeed (k_d)")
     gravity: Annotated[Quantity, positive("m/s^2")] = Field(description="m/s^2")
     rotor_reaction: Annotated[
@@ -73,6 +103,15 @@ class VehicleFile(Strict):
         default=Quantity(value=1.0, unit="1", source="physics: momentum is conserved"),
         description="share of the reaction to a rotor's change of speed: 1 as physics is, 0 without",
     )
+    thrust_curve: (
+        Annotated[Quantity, in_unit("1", lambda value: -STEEPEST <= value <= STEEPEST, "-1 to 1")] | None
+    ) = Field(
+        default=None, description="1, a of T = T_max (a u^2 + (1 - a) u) for a signal u: THR_MDL_FAC, MOT_THST_EXPO"
+    )
+    rotor_radius: Annotated[Quantity, positive("m")] | None = Field(
+        default=None, description="m, radius of the rotors: with it thrust grows near the ground"
+    )
+    battery: BatteryFile | None = Field(default=None, description="the pack; flown with start.charge")
     air: AirFile | None = Field(default=None, description="what the air does beyond linear drag")
     rotor: tuple[Rotor, ...] = Field(description="3 to 16 rotors, in any order")
 
@@ -80,9 +119,11 @@ class VehicleFile(Strict):
     def _consistent(self) -> VehicleFile:
         for check in (
             self._check_inertia,
+            self._check_battery,
             self._check_count,
+            self._check_lists,
             self._check_thrust,
-            self._check_rank,
+            self._check_reach,
             self._check_hover,
         ):
             error = check()
@@ -93,53 +134,17 @@ class VehicleFile(Strict):
     def __repr__(self) -> str:
         return f"<vehicle {cut(self.name)}: {self.mass.value:g} kg, thrust-to-weight {self.thrust_to_weight:.3g}>"
 
-    def with_factors(self, factors: Mapping[str, float]) -> VehicleFile:
-        """The same vehicle with some numbers times factors; it keeps the rules of a file that say what can exist.
-
-        One that is too heavy to hover exists: maps show where that begins.
-
-        Parameters
-        ----------
-        factors : mapping
-            By key, such as ``mass``; those that are 1 change nothing.
-
-        Raises
-        ------
-        PydanticCustomError
-            If such a vehicle is none.
-        """
-        changed: dict[str, Quantity] = {}
-        for key, factor in factors.items():
-            if factor == 1.0:
-                continue
-            old: Quantity = getattr(self, key)
-            value = old.value * factor
-            if not math.isfinite(value):
-                raise refusal(key, f"got {value!r} {old.unit}; allowed: a finite number")
-            changed[key] = Quantity.model_construct(value=value, unit=old.unit, source=old.source)
-            try:
-                for rule in type(self).model_fields[key].metadata:
-                    if isinstance(rule, AfterValidator):
-                        rule.func(changed[key])  # type: ignore[call-arg]
-            except PydanticCustomError as error:
-                raise refusal(key, error.message()) from None
-        if not changed:
-            return self
-        made = self.model_copy(update=changed)
-        wrong = made._check_inertia()
-        if wrong is not None:
-            raise wrong
-        return made
+    def check_existence(self) -> PydanticCustomError | None:
+        """What such a vehicle breaks of the rules that say what can exist, flyable or not; None if nothing."""
+        return self._check_inertia() or self._check_limits()
 
     def _check_inertia(self) -> PydanticCustomError | None:
-        moments = {"x": self.inertia_x.value, "y": self.inertia_y.value, "z": self.inertia_z.value}
-        for axis, moment in moments.items():
-            others = math.fsum(moments.values()) - moment
-            # Equality is a flat plate; rounding of printed digits must not refuse it.
-            if moment > others * (1.0 + 1e-9):
-                message = f"got {moment!r} kg m^2; allowed: at most the sum of the other two, {others:.6g} (no rigid"
-                return refusal(f"inertia_{axis}", f"{message} body has more); check the exponents")
-        return None
+        return inertia_refusal(np.array(self._moments), np.array(self._products))
+
+    def _check_battery(self) -> PydanticCustomError | None:
+        if self.battery is None or self.rotor_radius is not None:
+            return None
+        return refusal("rotor_radius", "is not given; a vehicle with [battery] needs it for the power of its rotors")
 
     def _check_count(self) -> PydanticCustomError | None:
         count = len(self.rotor)
@@ -147,12 +152,32 @@ class VehicleFile(Strict):
             return None
         return refusal("rotor", f"got {count} tables; allowed: {FEWEST_ROTORS} to {MOST_ROTORS} [[rotor]] tables")
 
+    def _check_lists(self) -> PydanticCustomError | None:
+        for key in (*ROTOR_NUMBERS, "rotor_bandwidth_down"):
+            quantity: RotorQuantity | None = getattr(self, key)
+            if quantity is not None and isinstance(quantity.value, tuple) and len(quantity.value) != len(self.rotor):
+                said = f"got a list of {len(quantity.value)}; allowed: one number, or a list with one for each of the"
+                return refusal(f"{key}.value", f"{said} {len(self.rotor)} rotors")
+        return None
+
+    def _check_limits(self) -> PydanticCustomError | None:
+        for low, high in zip(self.of_rotors("thrust_min"), self.of_rotors("thrust_max"), strict=True):
+            if not low < high:
+                return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
+        return None
+
     def _check_thrust(self) -> PydanticCustomError | None:
-        low, high = self.thrust_min.value, self.thrust_max.value
-        if not low < high:
-            return refusal("thrust_min", f"got {low!r} N; allowed: less than thrust_max = {high!r} N")
-        ratio = self.thrust_to_weight
-        hover = self.mass.value * self.gravity.value / (len(self.rotor) * self.rotor_gain.value)
+        wrong = self._check_limits()
+        if wrong is not None:
+            return wrong
+        low, high, ratio = min(self.of_rotors("thrust_min")), max(self.of_rotors("thrust_max")), self.thrust_to_weight
+        for least, most in zip(self.of_rotors("thrust_min"), self.of_rotors("thrust_max"), strict=True):
+            if not least >= -most:
+                said = (
+                    f"got {least!r} N; allowed: -thrust_max = {-most!r} N or more, for rotors that can turn backwards"
+                )
+                return refusal("thrust_min", said)
+        hover = self.mass.value * self.gravity.value / math.fsum(self.of_rotors("rotor_gain"))
         if not ratio > 1.0:
             message = f"got {high!r} N: thrust-to-weight is {ratio:.3g}; allowed: more than 1, so thrust_max above"
             grams = f"; if mass is in g, write {0.001 * self.mass.value:g} kg" if 1.0 < 1e3 * ratio < 25.0 else ""
@@ -164,52 +189,61 @@ class VehicleFile(Strict):
             )
         return None
 
-    def _check_rank(self) -> PydanticCustomError | None:
-        """Whether thrust, roll and pitch can be had independently, and yaw where there are rotors enough for it."""
-        rows = self._scaled_rows()
-        names = ("thrust", "roll", "pitch", "yaw")
-        # A flat tricopter has no yaw of its own, and flies without.
-        count = min(len(self.rotor), len(names))
-        for row in range(1, count):
-            others = np.delete(rows[:count], row, axis=0)
-            left = rows[row] - np.linalg.lstsq(others.T, rows[row], rcond=None)[0] @ others
-            length = float(np.linalg.norm(rows[row]))
-            share = float(np.linalg.norm(left)) / max(length, 1e-300)
-            if length < LEAST_ROW or share < LEAST_ROW:
-                return refusal(
-                    "rotor",
-                    f"these {len(self.rotor)} rotors cannot give {names[row]} independently of the other axes "
-                    f"({share:.2g} of it is its own); allowed: rotors on different lines through the centre of mass, "
-                    "and some of each sense of rotation",
-                )
-        return None
+    def _check_reach(self) -> PydanticCustomError | None:
+        return reach_refusal(self.rotor_set)
 
     def _check_hover(self) -> PydanticCustomError | None:
-        """Whether the rotors can carry the weight level with no torque left over, each within its limits."""
         if self.pairs is not None:
             return None
-        from scipy.optimize import linprog
+        rotors = self.rotor_set
+        wrong = hover_refusal(rotors, self.mass.value * self.gravity.value)
+        return wrong or level_refusal(rotors, hover_thrust(self.vehicle)) if rotors.tilted else wrong
 
-        weight = self.mass.value * self.gravity.value
-        rows = self._scaled_rows()[: min(len(self.rotor), 4)]
-        low, high = (self.rotor_gain.value * limit.value for limit in (self.thrust_min, self.thrust_max))
-        balance = [weight, *(0.0,) * (len(rows) - 1)]
-        if linprog(np.zeros(len(self.rotor)), A_eq=rows, b_eq=balance, bounds=(low, high)).status == 0:
-            return None
-        x, y = np.mean([(rotor.x.value, rotor.y.value) for rotor in self.rotor], axis=0)
-        return refusal(
-            "rotor",
-            f"no thrusts of {low:g} to {high:g} N carry {weight:.4g} N with all torques in balance; the middle of "
-            f"the rotors is {1e3 * x:.3g} mm forward and {1e3 * y:.3g} mm left of the centre of mass: check x and y, "
-            "which count from there, yaw and thrust_max",
+    def of_rotors(self, key: str) -> tuple[float, ...]:
+        """A number of the rotors for each of them."""
+        quantity: RotorQuantity = getattr(self, key)
+        return quantity.of(len(self.rotor))
+
+    def _rotor_number(self, key: str) -> Scalar:
+        """A number of the rotors: a float where the file has one for all.
+
+        What the file says decides, and not whether numbers happen to be equal: so a flight in a batch in which they
+        vary has the shape of the flight alone.
+        """
+        quantity: RotorQuantity = getattr(self, key)
+        return PerRotor(*quantity.value) if isinstance(quantity.value, tuple) else quantity.value
+
+    @property
+    def _moments(self) -> tuple[float, float, float]:
+        return self.inertia_x.value, self.inertia_y.value, self.inertia_z.value
+
+    @property
+    def _products(self) -> tuple[float, float, float]:
+        xy, xz, yz = (0.0 if q is None else q.value for q in (self.inertia_xy, self.inertia_xz, self.inertia_yz))
+        return xy, xz, yz
+
+    @property
+    def places(self) -> list[tuple[float, float, float]]:
+        """Where the rotors are, in m, forward, left and up of the centre of mass."""
+        centre = (0.0, 0.0, 0.0) if self.centre_of_mass is None else self.centre_of_mass.value
+        return [
+            (rotor.x.value - centre[0], rotor.y.value - centre[1], (rotor.z.value if rotor.z else 0.0) - centre[2])
+            for rotor in self.rotor
+        ]
+
+    @property
+    def axes(self) -> list[tuple[float, float, float]]:
+        """Unit vectors along which the rotors pull, body axes."""
+        return [UPWARD if rotor.axis is None else _unit(rotor.axis.value) for rotor in self.rotor]
+
+    @property
+    def rotor_set(self) -> RotorSet:
+        """The rotors as arrays, in the order of the file."""
+        signs = np.array([_sign(rotor) for rotor in self.rotor])
+        ratio, gain, low, high = (
+            np.array(self.of_rotors(key)) for key in ("torque_ratio", "rotor_gain", "thrust_min", "thrust_max")
         )
-
-    def _scaled_rows(self) -> Array:
-        """Thrust, roll, pitch and yaw of a newton of each rotor, torques over the longest arm; yaw as signs."""
-        x = np.array([rotor.x.value for rotor in self.rotor])
-        y = np.array([rotor.y.value for rotor in self.rotor])
-        arm = max(float(np.hypot(x, y).max()), 1e-300)
-        return np.array([np.ones(len(x)), y / arm, -x / arm, [_sign(rotor) for rotor in self.rotor]])
+        return RotorSet(np.array(self.places), np.array(self.axes), signs, ratio, gain * low, gain * high)
 
     def rotor_label(self, index: int) -> str:
         """A rotor in a message, by its number from 1 and its name if it has one; `index` counts from 0."""
@@ -218,69 +252,94 @@ class VehicleFile(Strict):
 
     @property
     def pairs(self) -> Opposite | None:
-        """The pairs of a quadrotor whose rotors are opposite in pairs that turn alike; None for any other frame."""
-        places = [(rotor.x.value, rotor.y.value) for rotor in self.rotor]
-        return opposite_pairs(places, [_sign(rotor) for rotor in self.rotor])
+        """The pairs of a quadrotor whose rotors are opposite in pairs that turn alike; None for any other frame.
+
+        None too where rotors have axes, or numbers of their own: what has a closed form is for equal ones.
+        """
+        listed = any(isinstance(getattr(self, key).value, tuple) for key in ROTOR_NUMBERS)
+        if listed or any(rotor.axis is not None for rotor in self.rotor):
+            return None
+        return opposite([(x, y) for x, y, _ in self.places], [_sign(rotor) for rotor in self.rotor])
 
     @property
     def thrust_to_weight(self) -> float:
-        """Greatest thrust of all rotors over the weight."""
-        return (
-            len(self.rotor) * self.rotor_gain.value * self.thrust_max.value / (self.mass.value * self.gravity.value)
-        )
+        """Greatest thrust of all rotors along body z over the weight."""
+        weight = self.mass.value * self.gravity.value
+        gain, high = self._rotor_number("rotor_gain"), self._rotor_number("thrust_max")
+        if isinstance(gain, float) and isinstance(high, float) and not self.rotor_set.tilted:
+            return len(self.rotor) * gain * high / weight
+        return float(np.maximum(self.rotor_set.axes[:, 2], 0.0) @ self.rotor_set.high) / weight
 
     @property
     def vehicle(self) -> Vehicle:
         """The numbers alone, as Python floats in SI units."""
+        places, axes = self.places, self.axes
+        tilted = any(rotor.axis is not None for rotor in self.rotor)
+        air = () if self.air is None else self.air.aerodynamics
+        discs = () if self.rotor_radius is None else Discs(self.rotor_radius.value)
+        high = self.centre_of_mass is not None or any(rotor.z is not None for rotor in self.rotor)
+        felt = tilted or air != () or discs != ()
+        ahead, left, above = (PerRotor.of(axis[k] for axis in axes) for k in range(3))
+        down = () if self.rotor_bandwidth_down is None else self._rotor_number("rotor_bandwidth_down")
+        products = self.inertia_xy, self.inertia_xz, self.inertia_yz
         return Vehicle(
             mass=self.mass.value,
-            inertia=Vec3(self.inertia_x.value, self.inertia_y.value, self.inertia_z.value),
+            inertia=Vec3(*self._moments),
             rotor_inertia=self.rotor_inertia.value,
-            rotor_x=PerRotor.of(rotor.x.value for rotor in self.rotor),
-            rotor_y=PerRotor.of(rotor.y.value for rotor in self.rotor),
+            rotor_x=PerRotor.of(x for x, _, _ in places),
+            rotor_y=PerRotor.of(y for _, y, _ in places),
             rotor_yaw_sign=PerRotor.of(_sign(rotor) for rotor in self.rotor),
-            thrust_coefficient=self.thrust_coefficient.value,
-            torque_ratio=self.torque_ratio.value,
-            thrust_min=self.thrust_min.value,
-            thrust_max=self.thrust_max.value,
-            rotor_bandwidth=self.rotor_bandwidth.value,
-            rotor_gain=self.rotor_gain.value,
+            thrust_coefficient=self._rotor_number("thrust_coefficient"),
+            torque_ratio=self._rotor_number("torque_ratio"),
+            thrust_min=self._rotor_number("thrust_min"),
+            thrust_max=self._rotor_number("thrust_max"),
+            rotor_bandwidth=self._rotor_number("rotor_bandwidth"),
+            rotor_gain=self._rotor_number("rotor_gain"),
             linear_drag=self.linear_drag.value,
             gravity=self.gravity.value,
             rotor_reaction=self.rotor_reaction.value,
-            air=self._aerodynamics(),
+            air=air,
+            battery=self._battery(),
+            discs=discs,
             pairs=self.pairs or (),
+            rotor_z=PerRotor.of(z for _, _, z in places) if high and felt else (),
+            rotor_bandwidth_down=down,
+            inertia_products=() if products == (None, None, None) else Vec3(*self._products),
+            tilt=Tilt(ahead, left, above) if tilted else (),
+            reversible=Reversible() if min(self.of_rotors("thrust_min")) < 0.0 else (),
         )
 
-    def _aerodynamics(self) -> Aerodynamics | tuple[()]:
-        """Coefficients of the air; empty where all are 0, which costs nothing then."""
-        if self.air is None or not any(self.air.number(key) for key in AirFile.model_fields):
+    def _battery(self) -> Battery | tuple[()]:
+        """Numbers of the pack; empty if there is none."""
+        if self.battery is None or self.rotor_radius is None:
             return ()
-        angles, axes = ("roll", "pitch", "yaw"), ("x", "y", "z")
-        return Aerodynamics(
-            rotor_z=PerRotor.of(0.0 if rotor.z is None else rotor.z.value for rotor in self.rotor),
-            rotor_drag=self.air.number("rotor_drag"),
-            inflow=self.air.number("inflow"),
-            translational_lift=self.air.number("translational_lift"),
-            flapping=self.air.number("flapping"),
-            frame_drag=self.air.along("frame_drag", axes),
-            damping=self.air.along("damping", angles),
-            damping_squared=self.air.along("damping_squared", angles),
-        )
+        curve = 1.0 if self.thrust_curve is None else self.thrust_curve.value
+        return self.battery.pack(self.rotor_radius.value, curve)
 
-    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+    def quantities(self) -> Iterator[tuple[str, Quantity | RotorQuantity | TripleQuantity]]:
         """Every number of the file under its key, such as ``mass`` or ``rotor.1.x``, with unit and source."""
         for key in type(self).model_fields:
-            if isinstance(quantity := getattr(self, key), Quantity):
+            if isinstance(quantity := getattr(self, key), (Quantity, RotorQuantity, TripleQuantity)):
                 yield key, quantity
         for number, rotor in enumerate(self.rotor, start=1):
             yield f"rotor.{number}.x", rotor.x
             yield f"rotor.{number}.y", rotor.y
             if rotor.z is not None:
                 yield f"rotor.{number}.z", rotor.z
+            if rotor.axis is not None:
+                yield f"rotor.{number}.axis", rotor.axis
+        for key in () if self.battery is None else BatteryFile.model_fields:
+            yield f"battery.{key}", getattr(self.battery, key)
         for key in () if self.air is None else AirFile.model_fields:
             if (coefficient := getattr(self.air, key)) is not None:
                 yield f"air.{key}", coefficient
+
+
+def _unit(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    """An axis of length 1: what was printed with few digits is brought to it."""
+    x, y, z = axis
+    length = math.sqrt(x * x + y * y + z * z)
+    return x / length, y / length, z / length
 
 
 def _sign(rotor: Rotor) -> float:

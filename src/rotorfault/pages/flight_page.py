@@ -20,7 +20,8 @@ from markupsafe import Markup
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.base.plain_text import argument, one_line
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, spread
+from rotorfault.model.motion import mean_of
 from rotorfault.model.vehicle import wrench_of
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.pages.panels import Panel, derived, panels
@@ -180,20 +181,24 @@ def _vehicle(data: FlightData, file: VehicleFile | None) -> dict[str, Any] | Non
     count = len(file.rotor)
     units = [PerRotor.of([float(i == k) for i in range(count)]) for k in range(count)]
     wrenches = [wrench_of(vehicle, unit) for unit in units]
+    ranges = (spread(x, count) for x in (vehicle.rotor_gain, vehicle.thrust_min, vehicle.thrust_max))
     return {
         "name": _short(file.name),
         "weight": float(vehicle.mass * vehicle.gravity),
-        "gain": float(vehicle.rotor_gain),
+        "gain": float(mean_of(vehicle.rotor_gain)),
         **_limits(data),
         "rotors": [
             {
                 "name": _short(rotor.name),
-                "position": [rotor.x.value, rotor.y.value, 0.0],
-                "axis": [0.0, 0.0, 1.0],
+                "position": [x, y, 0.0],
+                "axis": [*axis],
+                "limits": [gain * low, gain * high],  # N, of its thrust
                 "turn": -1.0 if rotor.yaw == "+" else 1.0,  # about its axis: drag turns the body the other way
                 "wrench": [float(w.thrust), *map(float, w.torque_B)],
             }
-            for rotor, w in zip(file.rotor, wrenches, strict=True)
+            for rotor, (x, y, _), axis, w, gain, low, high in zip(
+                file.rotor, file.places, file.axes, wrenches, *ranges, strict=True
+            )
         ],
     }
 

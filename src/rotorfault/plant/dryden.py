@@ -43,13 +43,13 @@ from typing import ClassVar, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, exp, maximum, sqrt
-from rotorfault.model.block import Context, Nothing, Record
+from rotorfault.model.block import Context, Nothing, Record, TimeGrid
 from rotorfault.model.slot import register
 from rotorfault.plant.timed import TimeInputs
 from rotorfault.plant.wind import Air, Wind
+from rotorfault.plant.wind_in_space import InSpace, SpaceNumbers, air_at, space_numbers, too_short, varies
 
 FOOT = 0.3048  # m
 
@@ -66,6 +66,7 @@ class DrydenParameters(NamedTuple):
     length_level: Scalar  # m, of u and v
     length_up: Scalar  # m, of w
     period: Scalar  # s
+    space: SpaceNumbers = SpaceNumbers()
 
 
 class DrydenMemory(NamedTuple):
@@ -112,12 +113,13 @@ def _filter(length: Scalar, parameters: DrydenParameters, period: Scalar) -> _Fi
 @final
 @register("dryden")
 class Dryden(Wind[DrydenMemory, DrydenParameters]):
-    """Steady wind with random gusts: Dryden model of MIL-F-8785C for low altitude."""
+    """Steady wind with random gusts (Dryden, MIL-F-8785C); with shear and a gust front if they are set."""
 
+    limits_grid = True
     normals: ClassVar[int] = 3
     first_normals: ClassVar[int | None] = 6
 
-    class Settings(Strict):
+    class Settings(InSpace):
         """Mean wind, and what the gusts' intensity and scale follow from; the defaults fit the paper's 3.6 m/s."""
 
         velocity_W: tuple[float, float, float] = Field(
@@ -153,7 +155,12 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
             length_level=s.altitude / shape**1.2,
             length_up=s.altitude,
             period=context.period,
+            space=space_numbers(s),
         )
+
+    def off_grid(self, grid: TimeGrid) -> tuple[str, str] | None:
+        """A front that is over within a step."""
+        return too_short(self.settings, grid)
 
     def initial(self, inputs: TimeInputs, parameters: DrydenParameters) -> DrydenMemory:
         """Memory in its stationary distribution."""
@@ -180,13 +187,26 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
         )
         return after, self.at(inputs.time, after, parameters), Nothing()
 
-    def mean_velocity(self, parameters: DrydenParameters) -> Vec3:
-        """That of the wind which carries the gusts."""
-        return parameters.velocity_W
+    def mean_velocity(self, parameters: DrydenParameters) -> Vec3 | None:
+        """That of the wind which carries the gusts; None with shear or a front."""
+        return None if self.in_space() else parameters.velocity_W
+
+    def in_space(self) -> bool:
+        """With shear or a front."""
+        return varies(self.settings)
+
+    def velocity_at(self, place_W: Vec3, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Vec3:
+        """Mean wind with shear, plus gust, plus front."""
+        gust_W = self._gust(memory, parameters)
+        return air_at(place_W, time, parameters.velocity_W, gust_W, self.settings, parameters.space)
 
     def at(self, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Air:
         """Mean wind plus gust."""
+        return Air(parameters.velocity_W + self._gust(memory, parameters), zeros())
+
+    @staticmethod
+    def _gust(memory: DrydenMemory, parameters: DrydenParameters) -> Vec3:
+        """The gust in m/s, world axes."""
         p, gust = parameters, memory.gust
         u, v, w = gust.x * p.sigma_level, gust.y * p.sigma_level, gust.z * p.sigma_up
-        gust_W = Vec3(p.along_x * u - p.along_y * v, p.along_y * u + p.along_x * v, w)
-        return Air(p.velocity_W + gust_W, zeros())
+        return Vec3(p.along_x * u - p.along_y * v, p.along_y * u + p.along_x * v, w)

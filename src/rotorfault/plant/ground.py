@@ -15,7 +15,8 @@ point between the feet and the spin about the body z axis:
 The landing gear is our choice, scaled to the vehicle so that contact stays slow enough for a step of 1 ms on any of
 them: feet at the corners of a square with half side 2 rho, the centre of mass rho above them, rho and rho_z the
 radii of gyration about the horizontal and the vertical axis; springs that sink 2 mm under the weight. The radius
-rho_z as lever of friction is a simplification with the same end. Rotor tips and the air cushion are not modelled.
+rho_z as lever of friction is a simplification with the same end. Rotor tips are not modelled; the air cushion is in
+`rotorfault.plant.ground_effect`.
 """
 
 from __future__ import annotations
@@ -73,6 +74,10 @@ class Ground(Block[State, Contact, MemoryT, ParametersT]):
     def bottom(self, parameters: ParametersT) -> Scalar:
         """Height in m of the centre of mass below which the vehicle is in the ground, and its flight lost."""
         return self.height(parameters) - DEEPEST
+
+    def surface(self, parameters: ParametersT) -> Scalar:
+        """Height in m of the ground that rotors feel below them."""
+        return self.bottom(parameters)
 
     def longest_step(self) -> float:
         """Integration step in s up to which contact is stable with room to spare."""

@@ -9,7 +9,7 @@ models differ in their kinematics.
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar
@@ -22,11 +22,19 @@ from rotorfault.plant.wind import Air
 
 BodyT = TypeVar("BodyT", bound=tuple[Any, ...])
 
-__all__ = ["PLANT", "BodyModel", "acceleration", "angular_acceleration"]
+__all__ = ["PLANT", "BodyModel", "about_z", "acceleration", "angular_acceleration"]
 
 
 class BodyModel(Block[State, BodyT, BodyT, Nothing]):
-    """Motion of the body under a wrench: a state record and its derivative, which the plant integrates."""
+    """Motion of the body under a wrench: a state record and its derivative, which the plant integrates.
+
+    Attributes
+    ----------
+    upside_down : float
+        For how long in s it may be tilted beyond 90 degrees and still fly on; 0 for a model that is wrong there.
+    """
+
+    upside_down: ClassVar[float] = 0.0
 
     def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> BodyT:
         """State record for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and rates [rad/s]."""
@@ -38,7 +46,7 @@ class BodyModel(Block[State, BodyT, BodyT, Nothing]):
         wrench: Wrench,
         extra_acceleration_W: Vec3,
         vehicle: Vehicle,
-        residual_speed: Scalar,
+        residual_speed: Scalar | Vec3,
         air: Air,
     ) -> BodyT:
         """Time derivative of the state, as a record of the same shape.
@@ -53,22 +61,22 @@ class BodyModel(Block[State, BodyT, BodyT, Nothing]):
             Added to the translational acceleration.
         vehicle : Vehicle
             The true one.
-        residual_speed : scalar, rad/s
-            Sum of the signed rotor speeds, Omega of (4).
+        residual_speed : scalar or Vec3, rad/s
+            Sum of the signed rotor speeds, Omega of (4); of tilted rotors its vector in body axes.
         air : Air
             At the time of the state.
         """
         raise NotImplementedError(f"{type(self).__name__} has no derivative")
 
-    def turned(self, body: BodyT, rate: Scalar) -> BodyT:
-        """The state with its rate about body z changed by so much [rad/s].
+    def turned(self, body: BodyT, rate: Scalar | Vec3) -> BodyT:
+        """The state with its rate about body z changed by so much [rad/s]; all its body rates, if it is a vector.
 
         The plant needs it for the reaction of rotors. As it is here it serves models that have body rates `omega_B`.
         """
         omega_B = getattr(body, "omega_B", None)
         if omega_B is None:
             raise NotImplementedError(f"{type(self).__name__} has no turned, and its state no omega_B")
-        return body._replace(omega_B=omega_B + Vec3(0.0, 0.0, rate))  # type: ignore[attr-defined,no-any-return]
+        return body._replace(omega_B=omega_B + about_z(rate))  # type: ignore[attr-defined,no-any-return]
 
     def after_step(self, body: BodyT) -> BodyT:
         """Put a state that an integration step has left back on its constraints, if it has any."""
@@ -82,6 +90,11 @@ class BodyModel(Block[State, BodyT, BodyT, Nothing]):
 PLANT = Slot(
     "plant", BodyModel, "truth", "model of the body's motion", "plants", default="rigid_body",
 )  # fmt: skip
+
+
+def about_z(rate: Scalar | Vec3) -> Vec3:
+    """Body rates in rad/s: a number is the rate about body z."""
+    return rate if isinstance(rate, Vec3) else Vec3(0.0, 0.0, rate)
 
 
 def acceleration(

@@ -22,7 +22,7 @@ from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.signals import State, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant.models import BodyModel, acceleration
+from rotorfault.plant.models import BodyModel, about_z, acceleration
 from rotorfault.plant.wind import Air
 
 
@@ -50,7 +50,7 @@ class PaperModel(BodyModel[PaperState]):
         wrench: Wrench,
         extra_acceleration_W: Vec3,
         vehicle: Vehicle,
-        residual_speed: Scalar,
+        residual_speed: Scalar | Vec3,
         air: Air,
     ) -> PaperState:
         """Time derivative; see `rotorfault.plant.models.BodyModel`."""
@@ -62,9 +62,9 @@ class PaperModel(BodyModel[PaperState]):
             attitude_rate=angular_acceleration(vehicle, wrench.torque_B, body.attitude_rate, residual_speed),
         )
 
-    def turned(self, body: PaperState, rate: Scalar) -> PaperState:
-        """The state with its yaw rate changed by so much [rad/s]."""
-        return body._replace(attitude_rate=body.attitude_rate + Vec3(0.0, 0.0, rate))
+    def turned(self, body: PaperState, rate: Scalar | Vec3) -> PaperState:
+        """The state with its yaw rate, or all its rates, changed by so much [rad/s]."""
+        return body._replace(attitude_rate=body.attitude_rate + about_z(rate))
 
     def observe(self, body: PaperState) -> State:
         """The state as it is; omega_B holds the Euler rates."""

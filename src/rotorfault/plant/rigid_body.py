@@ -8,7 +8,7 @@ are told apart.
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.rotation import Quat
@@ -17,7 +17,7 @@ from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.signals import State, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
-from rotorfault.plant.models import BodyModel, acceleration
+from rotorfault.plant.models import BodyModel, about_z, acceleration
 from rotorfault.plant.wind import Air
 
 
@@ -35,6 +35,10 @@ class RigidBodyState(NamedTuple):
 class RigidBody(BodyModel[RigidBodyState]):
     """Rigid body on SO(3): quaternion attitude, valid at any angle."""
 
+    # Our choice. A vehicle that loses a rotor may roll over once and fly on; one that stays upside down for longer
+    # has fallen by more than a metre, its thrust pushing it down.
+    upside_down: ClassVar[float] = 0.5
+
     def start(self, p_W: Vec3, v_W: Vec3, attitude: Vec3, omega_B: Vec3) -> RigidBodyState:
         """State for position [m], velocity [m/s], (roll, pitch, yaw) [rad] and body rates [rad/s]."""
         return RigidBodyState(p_W, v_W, Quat.from_euler(attitude), omega_B)
@@ -45,7 +49,7 @@ class RigidBody(BodyModel[RigidBodyState]):
         wrench: Wrench,
         extra_acceleration_W: Vec3,
         vehicle: Vehicle,
-        residual_speed: Scalar,
+        residual_speed: Scalar | Vec3,
         air: Air,
     ) -> RigidBodyState:
         """Time derivative; see `rotorfault.plant.models.BodyModel`."""
@@ -58,9 +62,9 @@ class RigidBody(BodyModel[RigidBodyState]):
             omega_B=angular_acceleration(vehicle, wrench.torque_B, body.omega_B, residual_speed),
         )
 
-    def turned(self, body: RigidBodyState, rate: Scalar) -> RigidBodyState:
-        """The state with its rate about body z changed by so much [rad/s]."""
-        return body._replace(omega_B=body.omega_B + Vec3(0.0, 0.0, rate))
+    def turned(self, body: RigidBodyState, rate: Scalar | Vec3) -> RigidBodyState:
+        """The state with its rate about body z, or all body rates, changed by so much [rad/s]."""
+        return body._replace(omega_B=body.omega_B + about_z(rate))
 
     def after_step(self, body: RigidBodyState) -> RigidBodyState:
         """Bring the quaternion back to unit length, which integration keeps only to its own order."""

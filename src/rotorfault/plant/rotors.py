@@ -18,6 +18,8 @@ that it causes exactly (:math:`z = w_0h`):
 They differ from :math:`e^{-w_0t}` by :math:`O(z^2)` in such a way that the step keeps its fourth order, and vanish as
 6/z for fast rotors, which follow at once. Speeds, roots of thrusts, are taken as they are at the three times, with
 the first one changed so that their mean would be right if they decayed like thrusts (`LagStep.sag`, of order z^3).
+Rotors may have different bandwidths, and one for thrust that falls (`rotorfault.model.motion.lag_bandwidth`): each
+rotor then has weights of its own.
 Source of the functions: M. Hochbruck, A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010, section 2.
 
 Readings (docs/paper.md): a loss acts *after* the lag, at once; and what is lost is thrust, not speed: a rotor with a
@@ -30,10 +32,12 @@ is not modelled.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, minimum, select
+from rotorfault.model.motion import greatest_thrust, lag_bandwidth
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 from rotorfault.plant.faults import RotorFault
 
@@ -49,7 +53,9 @@ class LagStep(NamedTuple):
 
     driving: tuple[PerRotor, PerRotor, PerRotor]  # what a Runge-Kutta step is to take for them: start, middle, end
     outputs: tuple[PerRotor, PerRotor, PerRotor]  # what they are at its start, in its middle and at its end
-    sag: Scalar  # what is to be taken off the start for the right mean of what decays likewise, as share of its fall
+    # What is to be taken off the start for the right mean of what decays likewise, as share of its fall; one for each
+    # rotor where their lags differ.
+    sag: PerRotor | Scalar
 
 
 def lag_step(vehicle: Vehicle, output: PerRotor, limited: PerRotor, dt: Scalar) -> LagStep:
@@ -65,13 +71,23 @@ def lag_step(vehicle: Vehicle, output: PerRotor, limited: PerRotor, dt: Scalar) 
     dt : scalar, s
         Step size.
     """
-    z = vehicle.rotor_bandwidth * dt
+    z = lag_bandwidth(vehicle, output, limited) * dt
     gap = output - limited
-    first, middle, last = (limited + gap * weight for weight in stage_weights(z))
-    half, whole = exp(-0.5 * z), exp(-z)
-    mean = _integrals(z)[0]
+    first, middle, last = (limited + gap * weight for weight in _of_each(stage_weights, z))
+    half, whole = per_rotor(exp, -0.5 * z), per_rotor(exp, -z)
+    mean = _of_each(_integrals, z)[0]
     sag = (1.0 + 4.0 * half + whole - 6.0 * mean) / (z * mean)
     return LagStep((first, middle, last), (output, limited + gap * half, limited + gap * whole), sag)
+
+
+def _of_each(
+    function: Callable[[Scalar], tuple[Scalar, Scalar, Scalar]], z: PerRotor | Scalar
+) -> tuple[PerRotor | Scalar, PerRotor | Scalar, PerRotor | Scalar]:
+    """Three functions of z, for each rotor where z is one of each."""
+    if not isinstance(z, PerRotor):
+        return function(z)
+    first, second, third = zip(*map(function, z), strict=True)
+    return PerRotor.of(first), PerRotor.of(second), PerRotor.of(third)
 
 
 def stage_weights(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
@@ -99,12 +115,19 @@ def _integrals(z: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     return phi_1, phi_2, phi_3
 
 
-def lag_derivative(vehicle: Vehicle, output: PerRotor, limited: PerRotor) -> PerRotor:
+def lag_derivative(bandwidth: PerRotor | Scalar, output: PerRotor, limited: PerRotor) -> PerRotor:
     """Time derivative in N/s of the lag outputs v in N, for commands in N that are within the limits.
 
     For integrators other than the plant's own, which has the lag in closed form (`lag_step`).
+
+    Parameters
+    ----------
+    bandwidth : scalar or PerRotor, rad/s
+        Of `rotorfault.model.motion.lag_bandwidth`; it holds as long as the commands do.
+    output, limited : PerRotor, N
+        Lag outputs and commands.
     """
-    rate: PerRotor = (limited - output) * vehicle.rotor_bandwidth
+    rate: PerRotor = (limited - output) * bandwidth
     return rate
 
 
@@ -116,8 +139,13 @@ def delivered_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> P
 
 def true_rotor_speeds(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
     """Rotor speeds in rad/s, negative where reversed, for lag outputs in N."""
-    sound = output * vehicle.rotor_gain
-    return rotor_speeds(vehicle, _held(sound, fault))
+    return rotor_speeds(vehicle, turning_thrust(vehicle, output, fault))
+
+
+def turning_thrust(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor:
+    """Thrusts in N that sound rotors would give that turn as these do, for lag outputs in N."""
+    sound: PerRotor = output * vehicle.rotor_gain
+    return _held(sound, fault)
 
 
 def _held(followed: PerRotor, fault: RotorFault) -> PerRotor:
@@ -132,6 +160,10 @@ def true_loss(vehicle: Vehicle, output: PerRotor, fault: RotorFault) -> PerRotor
     depends on what is commanded.
     """
     sound = output * vehicle.rotor_gain
-    least = _LEAST_SHARE * vehicle.rotor_gain * vehicle.thrust_max
-    short = fault.stuck_thrust.map(lambda held, f: clip(1.0 - held / maximum(f, least), 0.0, 1.0), sound)
+    least = greatest_thrust(vehicle, _LEAST_SHARE)
+
+    def missing(held: Scalar, f: Scalar, least: Scalar) -> Scalar:
+        return clip(1.0 - held / maximum(f, least), 0.0, 1.0)
+
+    short = per_rotor(missing, fault.stuck_thrust, sound, least)
     return fault.stuck.map(select, short, 1.0 - fault.effectiveness)

@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rotorfault.maths.arrays import Array
+from rotorfault.maths.geometry import PerRotor, spread
 from rotorfault.report.drawn import Drawn, around_onsets
 from rotorfault.report.marks import legend, sample
 from rotorfault.report.panels import Curve, Panel, grid, one_scale, solid, whole_and_detail
@@ -68,7 +70,10 @@ def rotor_figure(drawn: Sequence[Drawn]) -> Figure:
 def _with_possible(flight: Drawn) -> Drawn:
     """With the greatest thrust that the autopilot believes of each rotor; of one believed stuck, what it gives."""
     vehicle = flight.vehicle
-    greatest = (1.0 if vehicle is None else vehicle.rotor_gain) * float(flight.data.attrs.get("thrust_max", np.nan))
+    greatest: Array | float = float(flight.data.attrs.get("thrust_max", np.nan))
+    if vehicle is not None:
+        known = vehicle.thrust_max if isinstance(vehicle.thrust_max, PerRotor) else greatest
+        greatest = np.array([*spread(vehicle.rotor_gain * known, vehicle.rotors)])
     held, followed = believed_stuck_at(flight.data), (1.0 - flight.values("loss_believed")) * greatest
     return flight.adding({"thrust_possible": np.where(np.isfinite(held), held, followed)}, "thrust")
 

@@ -34,7 +34,7 @@ def layout_figure(vehicle: VehicleFile) -> Figure:
     figure = new_figure(10.5)
     axes = figure.add_subplot()
     # On the page, left is left: y runs to the left.
-    places = np.array([(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor])
+    places = np.array([(x, y) for x, y, _ in vehicle.places])
     arms = np.hypot(*places.T)
     largest = float(arms.max())
     between = [math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :]]

@@ -149,7 +149,8 @@ class VehicleView:
         self._bow.set_segments([seen(np.array([(0.0, 0.0, 0.0), (0.62 * frame.arm, 0.0, 0.0)]))])
         self._discs.set_verts([seen(self._discs_B[k]) for k in order])
         self._discs.set_facecolor([(*colours[k], 0.8) for k in order])
-        tips_B = frame.places + np.outer(ARROW * frame.arm * thrust, (0.0, 0.0, 1.0))
+        axes = np.array([(0.0, 0.0, 1.0)]) if frame.axes is None else frame.axes
+        tips_B = frame.places + (ARROW * frame.arm * thrust)[:, None] * axes
         tips = seen(tips_B)
         heads, shafts = [], []
         for k in order:

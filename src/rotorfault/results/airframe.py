@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from rotorfault.base.one_line import cut
 from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
+from rotorfault.maths.geometry import spread
 from rotorfault.model.frames import load_frame
+from rotorfault.model.motion import mean_of
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import vehicle_file_of
 
@@ -41,8 +43,9 @@ class Airframe(NamedTuple):
     yaw_signs: Array  # (rotors,), +1 where the drag torque turns the body towards positive yaw
     names: tuple[str, ...]  # the vendor's, or the number
     weight: float  # N
-    thrust_max: float  # N per rotor
-    torque_ratio: float  # m
+    thrust_max: float  # N per rotor; of rotors that differ, that of the strongest
+    torque_ratio: float  # m; the mean
+    axes: Array | None = None  # (rotors, 3), along which rotors pull; None where all point up
 
     @property
     def rotors(self) -> int:
@@ -75,12 +78,13 @@ def airframe_of(data: FlightData) -> Airframe:
     vehicle = file.vehicle
     return Airframe(
         name=cut(file.name),
-        places=np.array([(rotor.x.value, rotor.y.value, 0.0) for rotor in file.rotor]),
+        places=np.array([(x, y, 0.0) for x, y, _ in file.places]),
         yaw_signs=np.array([1.0 if rotor.yaw == "+" else -1.0 for rotor in file.rotor]),
         names=tuple(one_line(rotor.name) or str(number) for number, rotor in enumerate(file.rotor, start=1)),
         weight=float(vehicle.mass * vehicle.gravity),
-        thrust_max=float(vehicle.thrust_max),
-        torque_ratio=float(vehicle.torque_ratio),
+        thrust_max=float(max(spread(vehicle.thrust_max, vehicle.rotors))),
+        torque_ratio=float(mean_of(vehicle.torque_ratio)),
+        axes=None if vehicle.tilt == () else np.array(file.axes),
     )
 
 

@@ -17,7 +17,7 @@ from rotorfault.base.plain_text import one_line
 from rotorfault.maths.arrays import Array
 from rotorfault.results.derived import STUCK, stuck_at, stuck_text
 from rotorfault.results.flight_data import FlightData
-from rotorfault.results.flown import faults_of
+from rotorfault.results.flown import faults_of, vehicle_file_of
 
 MERGE = 0.05  # s: what stops for less than that has not stopped
 JUMP = 0.02  # of a true loss from one record to the next: a fault that sets in, and no drift
@@ -207,15 +207,23 @@ def _saturation(data: FlightData, time: Array) -> Iterator[Event]:
         return
     command = np.asarray(data["thrust_command"].values, dtype=float)
     ends = (
-        ("upper", float(data.attrs["thrust_max"]), 1.0),
-        ("lower", float(data.attrs.get("thrust_min", 0.0)), -1.0),
+        ("upper", _limits(data, "thrust_max", command.shape[1]), 1.0),
+        ("lower", _limits(data, "thrust_min", command.shape[1]), -1.0),
     )
     for k in range(command.shape[1]):
-        for side, limit, sign in ends:
-            spans = _spans(time, sign * (command[:, k] - limit) >= -AT_LIMIT)
+        for side, limits, sign in ends:
+            spans = _spans(time, sign * (command[:, k] - limits[k]) >= -AT_LIMIT)
             for span, more in _first(spans):
                 text = f"command of rotor {k + 1} at its {side} limit {_span_text(span)}{more}"
                 yield Event(span.start, "saturation", text, k + 1, span.end)
+
+
+def _limits(data: FlightData, name: str, rotors: int) -> list[float]:
+    """A limit of the commands of each rotor in N."""
+    file = vehicle_file_of(data)
+    if file is not None and len(file.rotor) == rotors and len(set(own := file.of_rotors(name))) > 1:
+        return list(own)
+    return [float(data.attrs.get(name, 0.0))] * rotors
 
 
 def _given_up(data: FlightData, time: Array) -> Iterator[Event]:

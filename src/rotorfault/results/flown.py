@@ -6,7 +6,12 @@ import json
 from collections.abc import Mapping
 from typing import Any, Protocol
 
+from rotorfault.model.quantities import one_or_each
+from rotorfault.model.vehicle_changes import AT_THE_ORIGIN, Factor, with_factors
 from rotorfault.model.vehicle_file import VehicleFile
+
+FLOWN = ("mass", "rotor_gain", "thrust_max", "thrust_coefficient", "torque_ratio", "linear_drag")
+"""What of a mismatch makes the rotors and the weight of the vehicle that flew."""
 
 
 class Records(Protocol):
@@ -41,10 +46,15 @@ def true_vehicle_file(data: Records) -> VehicleFile | None:
         return None
     mismatch = configuration_of(data).get("mismatch", {})
     try:
-        factors = {key: float(mismatch[key]) for key in ("mass", "rotor_gain", "linear_drag") if key in mismatch}
-        return file.with_factors(factors)
+        factors = {key: _factor(mismatch[key]) for key in FLOWN if key in mismatch}
+        return with_factors(file, factors, mismatch.get("centre_of_mass", AT_THE_ORIGIN))
     except (ValueError, TypeError):
         return None
+
+
+def _factor(value: object) -> Factor:
+    found = one_or_each(value)
+    return list(found) if isinstance(found, tuple) else found
 
 
 def faults_of(data: Records, rotor: int) -> list[dict[str, Any]]:

@@ -13,7 +13,8 @@ import numpy as np
 from rotorfault.base.bounds import positive, require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.plant import FAULT
-from rotorfault.scenario.scenario import MOST_SEED, Mismatch, Scenario, Start
+from rotorfault.scenario.mismatch import Mismatch
+from rotorfault.scenario.scenario import MOST_SEED, Scenario, Start
 
 
 def neighbour(
@@ -61,6 +62,7 @@ def neighbour(
     x, y, z = _existing(scenario.vehicle.vehicle.inertia, inertia)
     mismatch = Mismatch(mass=mass, inertia=(x, y, z), linear_drag=drag)
     start = Start(
+        charge=scenario.start.charge,
         position=scaled(scenario.start.position),
         velocity=scaled(scenario.start.velocity),
         attitude=scaled(scenario.start.attitude),

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rotorfault.base.bounds import require_shallow
 from rotorfault.base.config import is_index
 from rotorfault.base.errors import InputError, short
+from rotorfault.model.vehicle import ROTOR_NUMBERS
 from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.scenario.mismatch import ROTOR_FACTORS
 from rotorfault.scenario.part import change_kind, change_preset
 from rotorfault.scenario.slots import SLOTS
+
+LISTED = (*ROTOR_NUMBERS, "rotor_bandwidth_down")
+"""Numbers of a vehicle file of which rotors may have one each."""
 
 
 def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
@@ -35,9 +40,11 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
     """Set a dotted key in tables, in place.
 
     Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
-    below it is set (``vehicle.rotor_bandwidth.value``). Setting ``kind``, or a table that has one to a bare name,
-    drops the other settings of that table: they belonged to another kind (`rotorfault.scenario.part.change_kind`).
-    Setting ``preset`` drops those that the former preset gave (`rotorfault.scenario.part.change_preset`).
+    below it is set (``vehicle.rotor_bandwidth.value``). A number that may be one for each rotor becomes such a list
+    when one of it is set (``mismatch.rotor_gain.2`` is that of rotor 3). Setting ``kind``, or a table that has one to
+    a bare name, drops the other settings of that table: they belonged to another kind
+    (`rotorfault.scenario.part.change_kind`). Setting ``preset`` drops those that the former preset gave
+    (`rotorfault.scenario.part.change_preset`).
 
     Raises
     ------
@@ -54,6 +61,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             if here is tables and part == "vehicle" and isinstance(inner, str):
                 # A vehicle's name stands for its file: laid out here, so that single numbers of it can be set.
                 inner = here[part] = load_vehicle(inner).model_dump(mode="json")
+            if depth == len(path) - 1 and for_rotors(path) and (is_number(inner) or inner is None):
+                inner = here[part] = [1.0 if inner is None else float(inner)] * _rotors(tables)
             if here is tables and part in SLOTS and (shorthand := SLOTS[part].shorthand) is not None:
                 # What stands for a table, such as the ground's height alone, is laid out likewise.
                 inner = here[part] = shorthand(inner)
@@ -80,6 +89,33 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             # The text that a checked scenario holds is that of the former file.
             here.pop("text", None)
         here[last] = value
+
+
+def for_rotors(path: Sequence[str]) -> bool:
+    """Whether a number of a scenario may be a list with one for each rotor.
+
+    Parameters
+    ----------
+    path : sequence of str
+        Its dotted key, in parts.
+    """
+    if len(path) == 2:
+        return path[0] == "mismatch" and path[1] in ROTOR_FACTORS
+    return len(path) == 3 and path[0] == "vehicle" and path[1] in LISTED and path[2] == "value"
+
+
+def is_number(value: object) -> bool:
+    """Whether a value of a table is a number."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _rotors(tables: Mapping[str, Any]) -> int:
+    """Number of rotors of the vehicle in the tables of a scenario; 0 where they do not tell."""
+    vehicle = tables.get("vehicle")
+    if isinstance(vehicle, str):
+        return len(load_vehicle(vehicle).rotor)
+    rotors = vehicle.get("rotor", ()) if isinstance(vehicle, Mapping) else getattr(vehicle, "rotor", ())
+    return len(rotors) if isinstance(rotors, (list, tuple)) else 0
 
 
 def _index(items: list[Any], part: str, key: str) -> int:

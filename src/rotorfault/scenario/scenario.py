@@ -14,7 +14,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, cast
 
-from pydantic import BeforeValidator, Field, ValidationError, create_model, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.response import ON_FAULT
@@ -30,6 +36,7 @@ from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
+from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part, field_of
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.time_grid import require_flyable, require_on_grid
@@ -55,6 +62,9 @@ class Start(Strict):
     velocity: Three = Field(default=(0.0, 0.0, 0.0), description="[m/s], world frame")
     attitude: tuple[Lean, Lean, Heading] = Field(default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]")
     body_rates: tuple[Rate, Rate, Rate] = Field(default=(0.0, 0.0, 0.0), description="[rad/s], body frame")
+    charge: float | None = Field(
+        default=None, gt=0.0, le=1.0, description="of the battery, 1 full; the voltage is constant if not given"
+    )
 
     @model_validator(mode="after")
     def _upright(self) -> Start:
@@ -68,36 +78,6 @@ class Start(Strict):
                 f"flight is lost; {meant}",
             )
         return self
-
-
-Factor = Annotated[float, Field(gt=0.0)]
-
-
-class Mismatch(Strict):
-    """Factors on the true vehicle that the autopilot does not know of: 1.1 is ten percent more than believed."""
-
-    mass: Factor = 1.0
-    inertia: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
-    rotor_bandwidth: Factor = 1.0
-    rotor_gain: Factor = 1.0
-    linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
-
-    def applied(self, vehicle: VehicleFile) -> Vehicle:
-        """The true vehicle for a believed one.
-
-        Raises
-        ------
-        PydanticCustomError
-            If there is no such vehicle: it keeps the rules of a vehicle file.
-        """
-        x, y, z = self.inertia
-        factors = {name: getattr(self, name) for name in ("mass", "rotor_bandwidth", "rotor_gain", "linear_drag")}
-        factors |= {"inertia_x": x, "inertia_y": y, "inertia_z": z}
-        try:
-            return vehicle.with_factors(factors).vehicle
-        except PydanticCustomError as error:
-            about = error.context or {}
-            raise refusal("mismatch", f"the true vehicle: {about.get('key')}: {error.message()}") from None
 
 
 def _vehicle(value: Any) -> VehicleFile:
@@ -130,6 +110,9 @@ class Scenario(Strict):
         default=None, gt=0.0, description="time between two records [s]; the sampling period if not given"
     )
     seed: int = Field(default=0, ge=0, le=MOST_SEED, description="names the random numbers of sensor noise and gusts")
+    voltage_compensation: bool = Field(
+        default=False, description="whether the autopilot sends more signal as the voltage of the battery falls"
+    )
     start: Start = Field(default=Start(), description=Start.__doc__)
     mismatch: Mismatch = Field(default=Mismatch(), description=Mismatch.__doc__)
 
@@ -197,6 +180,7 @@ class Scenario(Strict):
                 f"{self.steps / self.every:.3g} records take more memory than there is; allowed: up to "
                 f"{MOST_RECORDS:.0e}, so at least {self.duration / MOST_RECORDS:.2g} s",
             )
+        self._require_battery()
         require_flyable(self.mismatch.applied(self.vehicle), self.grid)
         count = len(self.vehicle.rotor)
         for number, fault in enumerate(self.all(FAULT)):
@@ -213,6 +197,15 @@ class Scenario(Strict):
             elif (one := self.maybe(slot)) is not None:
                 require_on_grid(one, slot.name, self.grid)
         return self
+
+    def _require_battery(self) -> None:
+        name = cut(self.vehicle.name)
+        if self.start.charge is not None and self.vehicle.battery is None:
+            raise refusal("start.charge", f"got {self.start.charge:g}, but vehicle '{name}' has no [battery]")
+        if self.voltage_compensation and self.start.charge is None:
+            raise refusal(
+                "voltage_compensation", "got true, but the voltage is constant; give start.charge, such as 1.0"
+            )
 
     @property
     def grid(self) -> TimeGrid:

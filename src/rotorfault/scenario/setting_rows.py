@@ -15,8 +15,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from rotorfault.model.slot import Slot
+from rotorfault.scenario.mismatch import EachRotor, Mismatch
 from rotorfault.scenario.part import Part
-from rotorfault.scenario.scenario import Mismatch, Start, scenario_fields
+from rotorfault.scenario.scenario import Start, scenario_fields
 from rotorfault.scenario.slots import SLOTS
 
 
@@ -103,6 +104,8 @@ def _allowed(field: FieldInfo) -> str:
     if get_origin(kind) in (Union, types.UnionType) and len(options) == 1:
         kind, options = options[0], []
     bounds = _bounds(field.metadata)
+    if any(isinstance(mark, EachRotor) for mark in field.metadata):
+        return f"number{bounds}, or a list with one for each rotor"
     if kind is bool:
         return "`true`, `false`"
     if kind is str:
@@ -134,14 +137,17 @@ def _bounds(metadata: list[Any]) -> str:
     return ",".join(f" {signs[name]} {value:g}" for name, value in found.items())
 
 
+NO_FACTORS = ("mismatch.centre_of_mass", "mismatch.thrust_curve")
+
+
 def scenario_settings() -> Iterator[Setting]:
     """All keys of a scenario; of a kind of part the key alone, for its settings are those of the part."""
     inside: dict[str, type[BaseModel]] = {"start": Start, "mismatch": Mismatch}
     for name, field in scenario_fields().items():
         if name in inside:
             for setting in settings(inside[name], f"{name}."):
-                factor = f"factor on the true {setting.meaning}" if name == "mismatch" else setting.meaning
-                yield setting._replace(meaning=factor)
+                plain = name != "mismatch" or setting.key in NO_FACTORS
+                yield setting if plain else setting._replace(meaning=f"factor on the true {setting.meaning}")
         elif name in SLOTS:
             yield _slot_setting(SLOTS[name], field)
         elif name == "vehicle":

@@ -25,6 +25,7 @@ from rotorfault.engine.batch import Batch, no_watch
 from rotorfault.flight.assembly import assemble_all
 from rotorfault.flight.candidates import assemble_with
 from rotorfault.maths.arrays import Array
+from rotorfault.model.motion import mean_bandwidth
 from rotorfault.model.telemetry import Layout
 from rotorfault.results.flight_data import flight_data
 from rotorfault.results.score_table import score_table
@@ -198,7 +199,7 @@ def tune(
     record = {
         CONTROLLER.name: controller,
         "vehicle": first.vehicle.name,
-        "rotor_bandwidth": first.vehicle.vehicle.rotor_bandwidth,
+        "rotor_bandwidth": mean_bandwidth(first.vehicle.vehicle),
         "scenarios": list(dict.fromkeys(group[0].name for group in groups)),
         "optimiser": f"CMA-ES (cma {cma.__version__})",
         "generations": done,

@@ -28,6 +28,7 @@ from allocation_cases import (
 from hypothesis import given, settings
 from scipy.optimize import linprog, lsq_linear
 
+from rotorfault.autopilot.allocation import ALLOCATION
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.model.mixer import nominal_inverse, pair_demand, rotor_thrusts
@@ -92,7 +93,8 @@ def test_report_is_demand_less_what_is_given(name: str, shares: tuple[float, ...
         assert yaw == 1.0 or abs(gap[3]) < size
 
 
-@each_allocator
+# Desaturation mixes yaw last, so what is within the limits with it may be beyond them before: it then gives less.
+@pytest.mark.parametrize("name", [name for name in ALLOCATION.registry if name != "sequential"])
 @given(shares=inside)
 def test_sound_rotors_give_what_they_can(name: str, shares: tuple[float, ...]) -> None:
     for vehicle in VEHICLES.values():

@@ -2,111 +2,76 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
-from typing import NamedTuple
+import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
 from allocation_cases import PAPER, Array, allocate
-from numpy.typing import NDArray
+from places import ROOT
 from scipy.optimize import linprog
 
 from rotorfault.autopilot.allocation.available import thrust_available
-from rotorfault.autopilot.allocation.nearest import limits_of, nearest
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.model.effectiveness import WrenchRows, effectiveness, pseudo_inverse
 from rotorfault.model.signals import Wrench, healthy
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Reversible, Vehicle, wrench_of
 
-CASES = 400
-MOST = 6.0  # N
-
-
-class Case(NamedTuple):
-    """A frame, what its rotors can give, and what is asked of it, all rows of the effectiveness of length 1."""
-
-    B: Array
-    demand: Array
-    high: Array
-    share: Array
+CASES = 420  # of benchmarks/allocation_study.py, with another seed
 
 
-def random_case(rng: np.random.Generator) -> Case:
-    """4 to 12 rotors on a circle, an ellipse, or not quite; senses that alternate or not; one or two weak or dead."""
-    n = int(rng.choice([4, 5, 6, 8, 12]))
-    angles = rng.uniform(0.0, 2.0 * math.pi) + 2.0 * math.pi * np.arange(n) / n
-    places = rng.uniform(0.15, 0.4) * np.array([np.cos(angles), np.sin(angles)])
-    places[0] *= rng.choice([1.0, rng.uniform(0.5, 1.5)])
-    places += rng.choice([0.0, 0.02]) * rng.normal(size=places.shape)
-    signs = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)
-    if n > 4 and rng.random() < 0.3:
-        signs = rng.permutation(signs)
-    B = np.array([np.ones(n), places[1], -places[0], rng.uniform(0.01, 0.05) * signs])
-    share = np.ones(n)
-    if rng.random() < 0.6:
-        for i in rng.choice(n, rng.integers(1, 3), replace=False):
-            share[i] = rng.choice([0.0, rng.uniform(0.1, 0.9)])
-    thrust = MOST * (share * rng.uniform(0.0, 1.0, n) if rng.random() < 0.5 else rng.uniform(-0.3, 1.3, n))
-    B /= np.linalg.norm(B, axis=1)[:, None]
-    return Case(B, B @ thrust, MOST * share, share)
+def script() -> ModuleType:
+    """The study of random frames, whose cases and programs these tests use."""
+    spec = importlib.util.spec_from_file_location("allocation_study", ROOT / "benchmarks" / "allocation_study.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
-def found(case: Case) -> Array:
-    rows = WrenchRows(*(PerRotor.of(row.tolist()) for row in case.B))
-    thrust, *torque = case.demand.tolist()
-    limits = limits_of(PerRotor.all(0.0, len(case.high)), PerRotor.of(case.high.tolist()), PerRotor.of(case.share))
-    return np.array([*nearest(rows, Wrench(thrust, Vec3(*torque)), limits)], dtype=float)
-
-
-def least(case: Case, held: dict[int, float], row: int) -> float:
-    """Least deviation of a row from the demand, others held at what they are; infinite where that cannot be."""
-    n = len(case.high)
-    cost = np.r_[np.zeros(n), 1.0]
-    off = np.array([[*case.B[row], -1.0], [*-case.B[row], -1.0]])
-    right = np.array([case.demand[row], -case.demand[row]])
-    rows = np.array([[*case.B[k], 0.0] for k in held])
-    answer = linprog(
-        cost, off, right, rows, np.array([*held.values()]), [*((0.0, float(x)) for x in case.high), (0.0, None)]
-    )
-    return float(answer.fun) if answer.status == 0 else math.inf
+STUDY = script()
 
 
 @pytest.fixture(scope="module")
-def measured() -> NDArray[np.float64]:
-    """Of cases with tilt that can be had: missed tilt; thrust and yaw beyond the least; whether all could be had."""
-    rng, rows = np.random.default_rng(5), []
-    for _ in range(CASES):
-        case = random_case(rng)
-        if np.linalg.matrix_rank(case.B) < 4:
-            continue
-        thrust = found(case)
-        assert (thrust >= 0.0).all()
-        assert (thrust <= case.high).all()
-        missed = np.abs(case.B @ thrust - case.demand)
-        tilt = {1: case.demand[1], 2: case.demand[2]}
-        up = least(case, tilt, 0)
-        if math.isinf(up):
-            continue
-        yaw = least(case, tilt | {0: float(case.B[0] @ thrust)}, 3) if missed[0] - up < 1e-6 else 0.0
-        rows.append([max(missed[1:3]), missed[0] - up, missed[3] - yaw, float(up < 1e-9 and yaw < 1e-7)])
-    return np.array(rows)
+def excesses() -> dict[tuple[str, bool], Array]:
+    """By how much allocators miss more than they must, for demands that can be met and others."""
+    found: dict[tuple[str, bool], list[Array]] = {}
+    for cases in STUDY.random_cases(np.random.default_rng(5), CASES):
+        optimum = STUDY.best(cases)
+        assert STUDY.agreement(cases, optimum) == 0
+        for name in ("nearest", "pairs", "sequential, roll_pitch"):
+            excess = STUDY.excess(cases, optimum, STUDY.ALLOCATORS[name](cases))
+            for attainable in (True, False):
+                these = excess[(optimum.attainable == attainable) & ~np.isnan(excess)]
+                found.setdefault((name, attainable), []).append(these)
+    return {key: np.concatenate(parts) for key, parts in found.items()}
 
 
-def test_what_can_be_had_is_had(measured: NDArray[np.float64]) -> None:
-    attainable = measured[measured[:, 3] == 1.0, :3]
-    assert len(attainable) > 150
-    worst = np.abs(attainable).max(axis=1)
-    assert np.quantile(worst, 0.97) < 1e-7
-    # The rest take more steps than there are: by so much they miss.
-    assert worst.max() < 0.1 * MOST
+def test_what_can_be_had_is_had(excesses: dict[tuple[str, bool], Array]) -> None:
+    assert len(excesses["nearest", True]) > 250
+    assert excesses["nearest", True].max() < 1e-6
 
 
-def test_what_cannot_be_had_gives_up_yaw_before_thrust_before_tilt(measured: NDArray[np.float64]) -> None:
-    short = measured[measured[:, 3] == 0.0, :3]
-    assert len(short) > 40
-    for column, share in zip(short.T, (0.9, 0.9, 0.9), strict=True):
-        assert np.quantile(column, share) < 1e-5
-        assert column.max() < 0.2 * MOST
+def test_what_cannot_be_had_gives_up_yaw_before_thrust_before_tilt(excesses: dict[tuple[str, bool], Array]) -> None:
+    beyond = excesses["nearest", False]
+    assert len(beyond) > 60
+    assert np.quantile(beyond, 0.8) < 1e-6
+    assert beyond.max() < 0.15
+
+
+def test_the_closed_form_for_pairs_is_exact(excesses: dict[tuple[str, bool], Array]) -> None:
+    for attainable in (True, False):
+        assert len(excesses["pairs", attainable]) > 1
+        assert excesses["pairs", attainable].max() < 1e-12
+
+
+def test_desaturation_leaves_what_could_be_had(excesses: dict[tuple[str, bool], Array]) -> None:
+    """So the study can tell allocators apart."""
+    assert (excesses["sequential, roll_pitch", True] > 1e-2).mean() > 0.25
 
 
 def hexarotor() -> Vehicle:
@@ -146,14 +111,34 @@ def test_thrust_that_is_no_number_is_a_command_that_is_none() -> None:
 
 
 def test_the_pseudo_inverse_is_that_of_numpy() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        case = random_case(rng)
-        if np.linalg.matrix_rank(case.B, tol=1e-3) < 4:
-            continue
-        rows = WrenchRows(*(PerRotor.of(row.tolist()) for row in case.B))
-        got = np.array([[*row] for row in pseudo_inverse(rows)])
-        np.testing.assert_allclose(got, np.linalg.pinv(case.B).T, atol=1e-6)
+    for cases in STUDY.random_cases(np.random.default_rng(3), 56):
+        for B in cases.rows:
+            if len(B[0]) < 4:
+                continue
+            got = np.array([[*row] for row in pseudo_inverse(WrenchRows(*(PerRotor.of(row.tolist()) for row in B)))])
+            size = np.abs(np.linalg.pinv(B)).max()
+            np.testing.assert_allclose(got, np.linalg.pinv(B).T, rtol=0.0, atol=1e-6 * size)
+
+
+def test_an_axis_that_is_hardly_its_own_is_left_out_of_the_inverse() -> None:
+    B = np.array([[1.0, 1.0, 1.0, 1.0, 1.0], [1.0, -1.0, 0.5, -0.5, 0.0], [0.3, 0.4, -1.0, -0.2, 0.5], [0.0] * 5])
+    B[3] = B[2] + 0.01 * np.array([1.0, -1.0, 1.0, 1.0, -1.0])
+    rows = WrenchRows(*(PerRotor.of(row.tolist()) for row in B))
+    got = np.array([[*row] for row in pseudo_inverse(rows, own=0.05)])
+    np.testing.assert_allclose(got[:3], np.linalg.pinv(B[:3]).T, atol=1e-12)
+    assert not got[3].any()
+    assert np.abs([[*row] for row in pseudo_inverse(rows)]).max() > 10.0
+
+
+def test_rotors_that_turn_backwards_do_so_where_it_is_needed_and_rest_where_dead() -> None:
+    vehicle = hexarotor()._replace(thrust_min=-1.0, reversible=Reversible())
+    dead = healthy(6)._replace(loss=PerRotor(1.0, *(0.0,) * 5), flagged=PerRotor(1.0, *(0.0,) * 5))
+    demand = Wrench(vehicle.mass * vehicle.gravity, Vec3(0.0, 0.0, 0.02))
+    found = allocate("effectiveness", vehicle, demand, dead)
+    assert found.command[0] == 0.0
+    assert min(found.command) < 0.0
+    assert [*found.given_up] == [0.0, 0.0, 0.0]
+    assert allocate("effectiveness", vehicle, demand._replace(torque_B=Vec3(0.0, 0.0, 3.0)), dead).command[0] == 0.0
 
 
 @pytest.mark.parametrize(("loss", "share"), [(0.0, 1.0), (0.4, None), (1.0, None)])

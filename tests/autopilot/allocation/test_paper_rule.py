@@ -19,7 +19,7 @@ from allocation_cases import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorfault.autopilot.allocation import ALLOCATION, Effectiveness, Nominal, PaperRule
+from rotorfault.autopilot.allocation import ALLOCATION, Effectiveness, Nominal, PaperRule, Sequential
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.model.signals import Wrench, healthy
@@ -120,7 +120,8 @@ def test_engines_agree(name: str, engine: Callable[..., Array]) -> None:
     np.testing.assert_allclose(engine(step(name), rows), floats, rtol=0, atol=1e-12)
 
 
-def test_registry_has_the_three() -> None:
+def test_registry_has_the_four() -> None:
     registry = ALLOCATION.registry
-    assert dict(registry.items()) == {"effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule}
+    kinds = {"effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule, "sequential": Sequential}
+    assert dict(registry.items()) == kinds
     assert all(registry.summary(name) for name in registry)

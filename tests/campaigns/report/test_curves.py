@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from campaign_tables import LOSS, TWO_FAULTS, WIND, falling, study_of, table_of
 
+from rotorfault.analysis.controllability import critical_loss_with
 from rotorfault.campaigns.report import curves
 from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.sampling.boundary import Boundary
@@ -64,3 +65,28 @@ def test_limits_between_cells_are_at_the_critical_loss(plane: Maps) -> None:
     critical = 1.0 - vehicle.mass * vehicle.gravity / (4.0 * vehicle.rotor_gain * vehicle.thrust_max)
     line = found.with_yaw[0]
     assert line[np.argmin(line[:, 1]), 0] == pytest.approx(critical, abs=1e-5)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_limits_beside_rotors_are_a_line_for_each_at_its_critical_loss(turned: bool) -> None:
+    """A hexarotor PPNNPN with too little thrust for all of its losses, where each rotor has its own."""
+    axes = [LOSS | {"values": [0.0, 0.5, 0.9, 1.0]}, {"name": "rotor", "values": "all"}]
+    own = {"vehicle": "du-ppnnpn", "vehicle.thrust_max.value": 3.6, "wind": "none"}
+    study = study_of(axes[::-1] if turned else axes, settings=own)
+    made = maps(study, table_of(study, falling))
+    found = curves.edges(made, 0, curves.slices(made)[0][0])
+    assert found is not None
+    for lines, channels in ((found.with_yaw, 4), (found.without_yaw, 3)):
+        places = {}
+        for line in lines:
+            x, y = line.T[::-1] if turned else line.T
+            assert x[0] == x[1]
+            assert y[1] - y[0] == 1.0
+            places[round(float(y.mean())) + 1] = float(x[0])
+        ratio = 6 * 3.6 / (1.535 * 9.8)
+        critical = {
+            rotor: critical_loss_with("du-ppnnpn", rotor, channels=channels, thrust_to_weight=ratio)
+            for rotor in range(1, 7)
+        }
+        assert places == pytest.approx({k: x for k, x in critical.items() if x < 1.0}, abs=1e-5)
+        assert places

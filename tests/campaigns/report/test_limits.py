@@ -11,6 +11,7 @@ from campaign_studies import TINY
 from campaign_tables import LOSS, TWO_FAULTS, WIND, study_of
 from places import EXAMPLES
 
+from rotorfault.analysis.controllability import control_authority, hover_problem
 from rotorfault.analysis.hover import hover_margin
 from rotorfault.campaigns.report.limits import Limits, limits
 from rotorfault.campaigns.report.maps import Maps
@@ -67,11 +68,34 @@ def of_masses(**settings: Any) -> Limits | None:
     return limits(study_from({**tables, "settings": calm}, "test", allow_code=True), 0, {"mass": masses})
 
 
-def margin_of(loss: float, wind_z: float = 0.0) -> Limits:
+def authority_of(loss: float, wind_z: float = 0.0) -> Limits:
+    """By the facets of all wrenches that the rotors can give, which is another way to the same."""
     vehicle = load_vehicle("paper").vehicle
-    vehicle = vehicle._replace(mass=vehicle.mass * np.linspace(0.6, 2.4, 25))
-    margin = hover_margin(vehicle, PerRotor(loss, 0.0, 0.0, 0.0), Vec3(0.0, 0.0, wind_z))
-    return Limits(np.asarray(margin.with_yaw, dtype=float), np.asarray(margin.without_yaw, dtype=float))
+    found = []
+    for mass in vehicle.mass * np.linspace(0.6, 2.4, 25):
+        problem = hover_problem(vehicle._replace(mass=mass))
+        share = 1.0 - np.array([loss, 0.0, 0.0, 0.0])
+        weight = mass * vehicle.gravity - vehicle.linear_drag * wind_z
+        problem = problem._replace(high=problem.high * share, needed=np.array([weight, 0.0, 0.0, 0.0]))
+        found.append([control_authority(problem.within(channels)).controllable for channels in (4, 3)])
+    return Limits(*np.array(found, dtype=float).T)
+
+
+@pytest.mark.parametrize("vehicle", ["du-pnpnpn", "du-ppnnpn", "y6", "x8"])
+def test_frames_are_controlled_where_their_index_is_positive(vehicle: str) -> None:
+    """With a dead rotor an alternating hexarotor can hover with yaw held, but not control it: the index is 0."""
+    losses = [0.3, 0.7, 0.95, 1.0]
+    axes = [{"name": "loss", "values": losses}, {"name": "rotor", "values": "all"}]
+    tables = {**TINY, "axis": axes, "draw": [], "settings": {"vehicle": vehicle, "wind": "none"}}
+    study = study_from(tables, "test")
+    values = study.cell_values(np.arange(study.cells))
+    found = limits(study, 0, values)
+    for k, (loss, rotor) in enumerate(zip(values["loss"], values["rotor"], strict=True)):
+        problem = hover_problem(load_vehicle(vehicle).vehicle)
+        share = np.where(np.arange(1, len(problem.high) + 1) == rotor, 1.0 - loss, 1.0)
+        problem = problem._replace(high=problem.high * share)
+        for told, channels in zip(found, (4, 3), strict=True):
+            assert told[k] == control_authority(problem.within(channels)).controllable, (loss, rotor, channels)
 
 
 TWO = [{"kind": "step", "time": 1.0, "loss": 0.2}, {"kind": "step", "time": 2.0, "loss": 0.25}]
@@ -88,9 +112,10 @@ FAULTS: dict[str, tuple[list[dict[str, Any]], float]] = {
 @pytest.mark.parametrize("name", list(FAULTS))
 def test_faults_say_what_loss_stays(name: str) -> None:
     faults, loss = FAULTS[name]
-    found, margin = of_masses(fault=[{**fault, "rotor": 1} for fault in faults]), margin_of(loss)
-    np.testing.assert_array_equal(found, margin)
-    assert 0.0 < np.mean(margin) < 1.0, "a map with one answer everywhere would prove nothing"
+    found, wanted = of_masses(fault=[{**fault, "rotor": 1} for fault in faults]), authority_of(loss)
+    np.testing.assert_array_equal(found, wanted)
+    lowest = -1.0 if loss == 1.0 else 0.0  # no quadrotor controls hover without a rotor
+    assert lowest < np.mean(wanted) < 1.0, "a map with one answer everywhere would prove nothing"
 
 
 def test_winds_say_their_mean(tmp_path: Path) -> None:
@@ -100,7 +125,7 @@ def test_winds_say_their_mean(tmp_path: Path) -> None:
         "        return rf.Vec3(0.0, 0.0, -40.0)\n"
     )
     found = of_masses(wind=f"{tmp_path / 'own.py'}:Down", fault=[])
-    np.testing.assert_array_equal(found, margin_of(0.0, -40.0))
-    assert np.sum(found) < np.sum(margin_of(0.0))
+    np.testing.assert_array_equal(found, authority_of(0.0, -40.0))
+    assert np.sum(found) < np.sum(authority_of(0.0))
     assert of_masses(wind=f"{EXAMPLES / 'wind.py'}:GustFront", fault=[]) is None
     assert of_masses(wind="paper", fault=[]) is None

@@ -7,5 +7,6 @@ from rotorfault.autopilot.allocation.effectiveness import Effectiveness
 from rotorfault.autopilot.allocation.nominal import Nominal
 from rotorfault.autopilot.allocation.paper_rule import PaperRule
 from rotorfault.autopilot.allocation.protocol import ALLOCATION, AllocationInputs, Allocator
+from rotorfault.autopilot.allocation.sequential import Sequential
 
-__all__ = ["ALLOCATION", "AllocationInputs", "Allocator", "Effectiveness", "Nominal", "PaperRule"]
+__all__ = ["ALLOCATION", "AllocationInputs", "Allocator", "Effectiveness", "Nominal", "PaperRule", "Sequential"]

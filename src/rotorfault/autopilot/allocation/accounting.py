@@ -13,7 +13,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, either, less_equal, negated, sqrt
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import pair_demand
-from rotorfault.model.motion import effect_of, limited
+from rotorfault.model.motion import effect_of, greatest_thrust, limited, mean_of
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.vehicle import Vehicle, wrench_of
 
@@ -43,7 +43,7 @@ def account(vehicle: Vehicle, wrench: Wrench, diagnosis: Diagnosis, command: Per
     given = wrench_of(vehicle, _given(vehicle, diagnosis, command))
     unallocated = Wrench(wrench.thrust - given.thrust, wrench.torque_B - given.torque_B)
     share = TOLERANCE if vehicle.pairs != () else TOLERANCE_OF_STEPS
-    tolerance = share * vehicle.rotor_gain * vehicle.thrust_max
+    tolerance = mean_of(greatest_thrust(vehicle, share))
 
     def beyond(x: Scalar) -> Scalar:
         return negated(less_equal(absolute(x), tolerance))

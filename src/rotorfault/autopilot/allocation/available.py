@@ -13,11 +13,11 @@ frames both are found by active sets (see `nearest`), from rotors at their least
 from __future__ import annotations
 
 from rotorfault.autopilot.allocation.nearest import limits_of, most_thrust
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import in_pairs
-from rotorfault.model.motion import effect_of
+from rotorfault.model.motion import effect_of, idle
 from rotorfault.model.signals import Stuck, following
 from rotorfault.model.vehicle import Vehicle
 
@@ -44,15 +44,20 @@ def thrust_available(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = Non
         In N: the thrust with yaw in balance; where that is less than `HOVER_RESERVE` times the weight, as much of
         this as there is with yaw given up.
     """
+    with_yaw, without_yaw = thrusts_in_balance(vehicle, loss, stuck)
+    return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
+
+
+def thrusts_in_balance(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = None) -> tuple[Scalar, Scalar]:
+    """Largest total thrusts in N with yaw in balance, and with yaw given up; parameters as of `thrust_available`."""
     stuck = following(vehicle.rotors) if stuck is None else stuck
     effect = effect_of(vehicle, loss, stuck)
     high = effect * vehicle.thrust_max + stuck.thrust
     if vehicle.pairs == ():
-        share = effect * (1.0 / vehicle.rotor_gain)
-        limits = limits_of(effect * vehicle.thrust_min + stuck.thrust, high, share)
-        with_yaw, without_yaw = most_thrust(effectiveness(vehicle), limits, STEPS)
-        return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
+        share = effect * per_rotor(lambda gain: 1.0 / gain, vehicle.rotor_gain)
+        # Rotors that can turn backwards begin at rest: there they are balanced, whatever each has lost.
+        limits = limits_of(effect * idle(vehicle) + stuck.thrust, high, share)
+        return most_thrust(effectiveness(vehicle), limits, STEPS)
     most = in_pairs(vehicle, high)
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
-    with_yaw, without_yaw = 2.0 * minimum(S12, S34), S12 + S34
-    return maximum(with_yaw, minimum(without_yaw, HOVER_RESERVE * vehicle.mass * vehicle.gravity))
+    return 2.0 * minimum(S12, S34), S12 + S34

@@ -39,13 +39,13 @@ from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.nearest import limits_of, nearest
 from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.base.config import Strict
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, per_rotor, spread
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, absolute, clip, either, less, maximum, minimum, select, sqrt
 from rotorfault.model.block import Context, Nothing, Record
-from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.effectiveness import effectiveness, lateral_rows
 from rotorfault.model.mixer import PairDemand, from_pairs, in_pairs, nominal_inverse, pair_demand, rotor_thrusts
-from rotorfault.model.motion import effect_of, limited
+from rotorfault.model.motion import effect_of, idle, limited, mean_bandwidth
 from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.vehicle import Vehicle
@@ -104,14 +104,14 @@ def allocated(
     stuck = diagnosis.stuck
     effect = effect_of(vehicle, diagnosis.loss, stuck)
     dead = stuck.effectiveness(diagnosis.loss).map(lambda left: less(left, effectiveness_min))
-    least = diagnosis.test.map(lambda f: maximum(f / vehicle.rotor_gain, vehicle.thrust_min))
+    least = least_command(vehicle, diagnosis.test, dead)
     low = effect * least + stuck.thrust
     high = dead.map(select, low, effect * vehicle.thrust_max + stuck.thrust)
 
     if vehicle.pairs == ():
         share = stuck.effectiveness(diagnosis.loss)
         limits = limits_of(low, high, dead.map(lambda is_dead, e: select(is_dead, 0.0, e), share))
-        thrust = nearest(effectiveness(vehicle), wrench, limits)
+        thrust = nearest(effectiveness(vehicle), wrench, limits, lateral=lateral_rows(vehicle))
         asked = nominal_inverse(vehicle, wrench) / vehicle.rotor_gain
         return _commanded(vehicle, wrench, diagnosis, Steady(thrust, low, effect, least, dead), asked)
     demand = pair_demand(vehicle, wrench)
@@ -122,6 +122,28 @@ def allocated(
 
     asked = from_pairs(vehicle, rotor_thrusts(demand)) / vehicle.rotor_gain
     return _commanded(vehicle, wrench, diagnosis, Steady(thrust, low, effect, least, dead), asked)
+
+
+def least_command(vehicle: Vehicle, test: PerRotor, dead: PerRotor) -> PerRotor:
+    """Least command in N of each rotor: its limit, or more under test; a dead one that could pull down is idle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    test : PerRotor, N
+        Least thrust of a sound rotor that the diagnosis asks for.
+    dead : PerRotor
+        1 where the rotor counts as dead.
+    """
+    if vehicle.reversible == ():
+        least: PerRotor = per_rotor(
+            lambda t, k, low: maximum(t / k, low), test, vehicle.rotor_gain, vehicle.thrust_min
+        )
+        return least
+    asked: PerRotor = test / vehicle.rotor_gain
+    low = dead.map(select, spread(idle(vehicle), len(dead)), spread(vehicle.thrust_min, len(dead)))
+    return test.map(lambda t, a, low: select(less(0.0, t), maximum(a, low), low), asked, low)
 
 
 class Steady(NamedTuple):
@@ -164,7 +186,7 @@ def yielding(vehicle: Vehicle, flagged: PerRotor, spin: Scalar) -> Yielding:
     spin : scalar, rad/s
         Yaw rate of the body.
     """
-    w, squared = vehicle.rotor_bandwidth, spin * spin
+    w, squared = mean_bandwidth(vehicle), spin * spin
     x1, _, x3, _ = in_pairs(vehicle, vehicle.rotor_x)
     y1, _, y3, _ = in_pairs(vehicle, vehicle.rotor_y)
     inertia = vehicle.inertia

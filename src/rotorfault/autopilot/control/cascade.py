@@ -14,6 +14,8 @@ Axis and heading pass a critically damped second-order command filter, exact for
 sampling period; its rate and acceleration are the attitude reference's, and the attitude group turns the error into
 torque = J (u_a + d(omega_ref)/dt - W omega_ref). What error and rates are: `rotorfault.autopilot.control.attitude`.
 
+Where a dead rotor leaves no balance of yaw, `rotorfault.autopilot.control.relaxed` steers a spinning body.
+
 The unphysical option ``six_inputs`` is the paper's literal (34): accelerations on x and y act directly, the
 attitude reference is level, thrust and torques still pass through the rotors.
 """
@@ -21,7 +23,7 @@ attitude reference is level, thrust and torques still pass through the rotors.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple, cast, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, cast, get_type_hints
 
 from pydantic import Field, create_model
 
@@ -37,16 +39,26 @@ from rotorfault.autopilot.control.protocol import (
     SlidingSignals,
     TrackingError,
 )
+from rotorfault.autopilot.control.relaxed import (
+    RelaxedMemory,
+    RelaxedParameters,
+    RelaxedSettings,
+    at_rest,
+    relaxed_parameters,
+)
 from rotorfault.autopilot.control.sdre import gyroscopic_drift
+from rotorfault.autopilot.control.spinning import Spinning
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
 from rotorfault.model.block import Context, Record
-from rotorfault.model.motion import drag_acceleration
+from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle, wrench_of
+from rotorfault.model.vehicle import Vehicle, body_momentum, wrench_of
+
+YawLost = Literal["relaxed", "upright"]
 
 
 class CascadeSettings(Strict):
@@ -82,6 +94,12 @@ class CascadeSettings(Strict):
         default="so3",
         description="so3: thrust axis and heading as rotations | euler: Euler rates taken for body rates, as in (3)",
     )
+    yaw_lost: YawLost = Field(
+        default="relaxed",
+        description="where yaw cannot be held: relaxed: spins about an axis that leaves its rotors room | upright: "
+        "about body z; laws without weights, and `euler`, are always upright",
+    )
+    relaxed: RelaxedSettings = Field(default=RelaxedSettings(), description=RelaxedSettings.__doc__)
     six_inputs: bool = Field(default=False, description="x and y accelerations act directly: unphysical, for study")
 
 
@@ -95,6 +113,7 @@ class CascadeParameters(NamedTuple):
     cos_min: Scalar
     filter_bandwidth: Scalar  # rad/s
     horizontal_lag: Scalar  # rad/s
+    relaxed: RelaxedParameters | tuple[()]  # empty where it stays upright
 
 
 class CascadeMemory(NamedTuple):
@@ -103,6 +122,7 @@ class CascadeMemory(NamedTuple):
     position: Any
     attitude: Any
     reference: AttitudeReference
+    relaxed: RelaxedMemory | tuple[()]  # empty where it stays upright
 
 
 def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
@@ -151,14 +171,18 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def parameters(self, context: Context) -> CascadeParameters:
         """Numbers of the law and of the cascade around it."""
         s = self.settings
+        law = self.law.parameters(context)
+        weights = self.law.spin_weights(law)
+        relaxes = s.yaw_lost == "relaxed" and s.tracking == "so3" and not s.six_inputs
         return CascadeParameters(
-            self.law.parameters(context),
+            law,
             math.tan(s.tilt_max),
             s.thrust_share,
             s.fall_share,
             s.cos_min,
             s.filter_bandwidth,
             s.horizontal_lag,
+            relaxed_parameters(s.relaxed, weights) if relaxes and weights is not None else (),
         )
 
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
@@ -171,7 +195,13 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         # Only its rate matters: surfaces begin there.
         attitude = _attitude_error(level, estimate.omega_B, level, level, nothing, Mat3.diagonal(level), level)
         law = self.law.initial(position, attitude, parameters.law)
-        return CascadeMemory(law.position, law.attitude, start)
+        relaxed = parameters.relaxed
+        return CascadeMemory(
+            law.position,
+            law.attitude,
+            start,
+            () if relaxed == () else at_rest(cast("RelaxedParameters", relaxed), inputs.vehicle),
+        )
 
     def step(
         self, memory: CascadeMemory, inputs: ControlInputs, parameters: CascadeParameters, dt: Scalar
@@ -179,16 +209,22 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         """One sampling instant."""
         estimate, reference, vehicle, believed = inputs.estimate, inputs.reference, inputs.vehicle, inputs.diagnosis
         six_inputs = self.settings.six_inputs
-        w0 = vehicle.rotor_bandwidth
+        w0 = mean_bandwidth(vehicle)
         R_WB = estimate.q_WB.matrix()
 
+        spinning = None
+        available = inputs.thrust_available
+        if memory.relaxed != ():
+            relaxed = cast("RelaxedMemory", memory.relaxed), cast("RelaxedParameters", parameters.relaxed)
+            spinning = Spinning(*relaxed, inputs, dt)
+            available = spinning.available
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
         position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
         wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
-        force_W = limited_force(wanted, inputs.thrust_available, vehicle, parameters)
+        force_W = limited_force(wanted, available, vehicle, parameters)
 
         # Thrust axis and heading, and how far the body is from them.
         if six_inputs:
@@ -197,9 +233,11 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         else:
             axis_W, direct = force_W, zeros()
             given = outer.u + force_W - wanted
-        turn = self.tracking.track(
-            memory.reference, estimate, R_WB, axis_W, reference, parameters.filter_bandwidth, dt
-        )
+        bandwidth = parameters.filter_bandwidth
+        if spinning is None:
+            turn = self.tracking.track(memory.reference, estimate, R_WB, axis_W, reference, bandwidth, dt)
+        else:
+            turn = spinning.track(self.tracking, memory.reference, R_WB, axis_W, bandwidth)
 
         # Attitude loop: torque.
         attitude = _attitude_error(
@@ -212,14 +250,15 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
+        given_B = wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B
         torque_B = self.tracking.ahead_of_lag(
-            (inner.u + attitude.feed_forward).times(vehicle.inertia),
-            wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B,
-            estimate.omega_B,
-            w0,
+            body_momentum(vehicle, inner.u + attitude.feed_forward), given_B, estimate.omega_B, w0
         )
+        wrench = Wrench(vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min), torque_B)
+        relaxed_memory = memory.relaxed
+        if spinning is not None:
+            relaxed_memory, wrench = spinning.steer(wrench, given_B, inner.switching)
 
-        thrust = vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min)
         own = CascadeSignals(
             attitude_demand=turn.demand,
             attitude_command=turn.command,
@@ -230,9 +269,10 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             gain_angle=inner.gain_e,
             gain_rate=inner.gain_rate,
         )
-        output = ControlOutput(Wrench(thrust, torque_B), direct)
+        output = ControlOutput(wrench, direct)
         recorded = [part for kind in self.law.records for part in _law_signals(kind, outer, inner)]
-        return CascadeMemory(position_memory, attitude_memory, turn.after), output, self._record(*own, *recorded)
+        after = CascadeMemory(position_memory, attitude_memory, turn.after, relaxed_memory)
+        return after, output, self._record(*own, *recorded)
 
 
 def _law_signals(kind: type[Record], position: LawOutput, attitude: LawOutput) -> Record:

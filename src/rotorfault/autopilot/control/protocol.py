@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple
 
-from rotorfault.autopilot.allocation.available import thrust_available
+from rotorfault.autopilot.allocation.available import thrust_available, thrusts_in_balance
+from rotorfault.autopilot.control.relaxed import SpinWeights
 from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.autopilot.presets import presets
@@ -35,8 +36,9 @@ class ControlInputs(NamedTuple):
     command: PerRotor  # N, sent at the last instant
     expected_thrust: PerRotor  # N: of sound rotors now; of the believed ones it is times 1 - loss
     prediction: Prediction
-    residual_speed: Scalar  # rad/s, believed overall residual rotor speed Omega of (4)
+    residual_speed: Scalar | Vec3  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
+    thrust_with_yaw: Scalar = 0.0  # N: the same with yaw in balance, whatever the weight
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -81,6 +83,7 @@ def _inputs(instant: Instant) -> ControlInputs:
         prediction=instant.prediction,
         residual_speed=instant.expectation.residual_speed,
         thrust_available=thrust_available(instant.vehicle, believed.loss, believed.stuck),
+        thrust_with_yaw=thrusts_in_balance(instant.vehicle, believed.loss, believed.stuck)[0],
     )
 
 
@@ -118,6 +121,7 @@ class LawOutput(NamedTuple):
     outside: Vec3 = zeros()  # 1 on axes outside the boundary layer
     riccati_residual: Scalar = 0.0  # of laws that solve a Riccati equation
     riccati_guarded: Scalar = 0.0  # 1 where the guaranteed gain was flown
+    switching: Vec3 = zeros()  # m/s^2 or rad/s^2: the part of u that is not the nominal law's; of laws that have one
 
 
 class SlidingSignals(NamedTuple):
@@ -177,6 +181,10 @@ class Law(Generic[ParametersT]):
     def initial(self, position: TrackingError, attitude: TrackingError, parameters: ParametersT) -> LawMemory:
         """Memory before the first step."""
         return LawMemory(Nothing(), Nothing())
+
+    def spin_weights(self, parameters: ParametersT) -> SpinWeights | None:
+        """Weights with which it steers a body that spins; None for a law that has none and stays upright."""
+        return None
 
     def position(
         self, memory: Any, error: TrackingError, parameters: ParametersT, dt: Scalar

@@ -35,6 +35,7 @@ from rotorfault.autopilot.control.protocol import (
     SlidingSignals,
     TrackingError,
 )
+from rotorfault.autopilot.control.relaxed import SpinWeights
 from rotorfault.autopilot.control.riccati import Gain
 from rotorfault.autopilot.control.sdre import (
     SdreParameters,
@@ -43,6 +44,7 @@ from rotorfault.autopilot.control.sdre import (
     initial_gain,
     position_gains,
     sdre_parameters,
+    spin_weights,
 )
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3
@@ -99,6 +101,10 @@ class Roismc(Law[RoismcParameters]):
             attitude=AttitudeMemory(initial_gain(attitude.drift, parameters.sdre), start(attitude.rate)),
         )
 
+    def spin_weights(self, parameters: RoismcParameters) -> SpinWeights:
+        """Of roll and pitch, their means."""
+        return spin_weights(parameters.sdre)
+
     def position(
         self, memory: Surface, error: TrackingError, parameters: RoismcParameters, dt: Scalar
     ) -> tuple[Surface, LawOutput]:
@@ -124,5 +130,5 @@ class Roismc(Law[RoismcParameters]):
             memory.surface, error, nominal, parameters.attitude, s.nominal, s.switching, dt
         )
         return AttitudeMemory(gain, surface), LawOutput(
-            u, K_angle, K_rate, sigma, outside_layer(sigma, parameters.attitude), residual, guarded
+            u, K_angle, K_rate, sigma, outside_layer(sigma, parameters.attitude), residual, guarded, u - nominal
         )

@@ -17,12 +17,13 @@ from typing import NamedTuple
 from pydantic import Field, field_validator
 
 from rotorfault.autopilot.control.protocol import Law, LawMemory, LawOutput, RiccatiSignals, TrackingError
+from rotorfault.autopilot.control.relaxed import SpinWeights
 from rotorfault.autopilot.control.riccati import Gain, attitude_problem, feedback, fly, guaranteed_gain
 from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, sqrt
 from rotorfault.model.block import Context, Nothing
-from rotorfault.model.vehicle import Vehicle
+from rotorfault.model.vehicle import Vehicle, inertia_matrix, rotor_momentum
 
 
 class Weights(Strict):
@@ -82,11 +83,25 @@ def sdre_parameters(weights: Weights) -> SdreParameters:
     )
 
 
-def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar) -> Mat3:
+def spin_weights(parameters: SdreParameters) -> SpinWeights:
+    """Weights of roll and pitch, their means."""
+    q, qd, r = parameters.attitude_q_angle, parameters.attitude_q_rate, parameters.attitude_r
+    both = r.x + r.y
+    return SpinWeights((q.x + q.y) / both, (qd.x + qd.y) / both)
+
+
+def gyroscopic_drift(vehicle: Vehicle, omega_B: Vec3, residual_speed: Scalar | Vec3) -> Mat3:
     """W(omega) of the SDC form in 1/s: omega_dot = W(omega) omega + J^{-1} tau, rows as in (3).
 
-    Each product of two rates is shared half and half between them; the rotor term is linear in one rate already.
+    Each product of two rates is shared half and half between them; the rotor term is linear in one rate already. With
+    S(v) u = v x u it is J^{-1}(S(h) - (S(omega) J - S(J omega)) / 2) for any inertia matrix and any momentum h of the
+    rotors.
     """
+    if vehicle.inertia_products != () or isinstance(residual_speed, Vec3):
+        matrix, momentum = inertia_matrix(vehicle), rotor_momentum(vehicle, residual_speed)
+        h = momentum if isinstance(momentum, Vec3) else Vec3(0.0, 0.0, momentum)
+        turning = Mat3.skew(omega_B) @ matrix - Mat3.skew(matrix @ omega_B)
+        return matrix.inverse() @ (Mat3.skew(h) - turning * 0.5)
     J = vehicle.inertia
     a1, a3, a5 = (J.y - J.z) / J.x, (J.z - J.x) / J.y, (J.x - J.y) / J.z
     rotor = vehicle.rotor_inertia * residual_speed
@@ -160,6 +175,10 @@ class Sdre(Law[SdreParameters]):
     def initial(self, position: TrackingError, attitude: TrackingError, parameters: SdreParameters) -> LawMemory:
         """Start from the guaranteed gain."""
         return LawMemory(position=Nothing(), attitude=initial_gain(attitude.drift, parameters))
+
+    def spin_weights(self, parameters: SdreParameters) -> SpinWeights:
+        """Of roll and pitch, their means."""
+        return spin_weights(parameters)
 
     def position(
         self, memory: Nothing, error: TrackingError, parameters: SdreParameters, dt: Scalar

@@ -40,7 +40,7 @@ from pydantic import Field, model_validator
 from rotorfault.autopilot.diagnosis.model_error import Misstated, Shares
 from rotorfault.autopilot.diagnosis.stuck import Seen, StuckMemory, StuckParameters, judged, nobody_judged
 from rotorfault.base.config import Strict
-from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import (
     Scalar,
     absolute,
@@ -58,6 +58,7 @@ from rotorfault.maths.scalar import (
     sqrt,
 )
 from rotorfault.model.mixer import from_pairs, hover_thrust, in_pairs
+from rotorfault.model.motion import mean_of
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.vehicle import Vehicle
 
@@ -204,7 +205,8 @@ def _loss(sound: Scalar, residual: PerRotor, per_thrust: PerRotor) -> PerRotor:
 def _per_thrust(thrust: PerRotor, vehicle: Vehicle) -> PerRotor:
     """One over the thrusts in 1/N; over a small one where there is less."""
     least = SMALL_THRUST * vehicle.thrust_max
-    return thrust.map(lambda f: 1.0 / maximum(f, least))
+    over: PerRotor = per_rotor(lambda f, least: 1.0 / maximum(f, least), thrust, least)
+    return over
 
 
 def decide(
@@ -232,7 +234,7 @@ def decide(
     p, sound = parameters, second_best(evidence.residual)
     per_thrust = _per_thrust(evidence.thrust, vehicle)
     losses = _loss(sound, evidence.residual, per_thrust)
-    hover, least = hover_thrust(vehicle).sum() / vehicle.rotors, SMALL_THRUST * vehicle.thrust_max
+    hover, least = hover_thrust(vehicle).sum() / vehicle.rotors, SMALL_THRUST * mean_of(vehicle.thrust_max)
     excess = evidence.residual.reduce(maximum) - sound
     # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
     half = 0.5 * dt

@@ -61,11 +61,18 @@ from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import nominal_inverse
-from rotorfault.model.motion import drag_acceleration, torque_of_motion
+from rotorfault.model.motion import (
+    drag_acceleration,
+    greatest_thrust,
+    mean_bandwidth,
+    mean_of,
+    torque_of_motion,
+    torque_of_turning,
+)
 from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
-from rotorfault.model.vehicle import wrench_of
+from rotorfault.model.vehicle import body_momentum, over_inertia, wrench_of
 
 Form = Literal["injected", "linear", "lag_states"]
 # Of tilt, 78 degrees: below it the vertical balance hardly sees the thrust. Our choice: an innovation is amplified
@@ -176,7 +183,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
                 f"diagnosis.poles: {fastest:g} rad/s at a sampling period of {period:g} s; allowed: up to "
                 f"{FASTEST_POLE / period:g} rad/s"
             )
-        w = vehicle.rotor_bandwidth
+        w = mean_bandwidth(vehicle)
         decay = math.exp(-w * period) if self.settings.form == "lag_states" else 1.0
         carry = (1.0 - decay) / w if self.settings.form == "lag_states" else period
         p, q = self.settings.poles
@@ -217,7 +224,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
-        deviation = Wrench(vehicle.mass * delta_z, vehicle.inertia.times(delta_omega))
+        deviation = Wrench(vehicle.mass * delta_z, body_momentum(vehicle, delta_omega))
         evidence = self._evidence(deviation, wrong, memory.decision.flagged, inputs, parameters)
         decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, dt)
         after = LuenbergerMemory(
@@ -247,7 +254,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             residual = nominal_inverse(vehicle, deviation)
             return Evidence(residual, thrust, misstated(wrong, flagged, shares, vehicle), noise)
         noisy, uncertain = torque_variances(wrong, flagged, shares, vehicle, parameters.dynamics)
-        most, apart = vehicle.rotor_gain * vehicle.thrust_max, parameters.decision.noise
+        most, apart = mean_of(greatest_thrust(vehicle)), parameters.decision.noise
         rows = effectiveness(vehicle)
         found = explained(rows, deviation.torque_B, noisy, uncertain, flagged, most, apart)
         return Evidence(found.residual, thrust, Misstated(found.model_error, found.model_error), found.noise)
@@ -257,7 +264,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         vehicle, expectation = inputs.vehicle, inputs.expectation
         wrench = wrench_of(vehicle, expectation.mean_thrust)
         lift = wrench.thrust / vehicle.mass
-        turn = wrench.torque_B.over(vehicle.inertia)
+        turn = over_inertia(vehicle, wrench.torque_B)
         if self.settings.form != "injected":
             return 1.0, lift - vehicle.gravity, turn
         before, now = expectation.previous, expectation.now
@@ -265,8 +272,10 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         climb = 0.5 * (before.v_W.z + now.v_W.z)
         omega_B = (before.omega_B + now.omega_B) * 0.5
         turning = torque_of_motion(vehicle, omega_B, expectation.residual_speed)
+        if vehicle.air != ():
+            turning = turning + torque_of_turning(vehicle, omega_B, expectation.speed)
         return (
             cosine,
             cosine * lift - vehicle.gravity + drag_acceleration(vehicle, Vec3(0.0, 0.0, -climb)).z,
-            turn + turning.over(vehicle.inertia),
+            turn + over_inertia(vehicle, turning),
         )

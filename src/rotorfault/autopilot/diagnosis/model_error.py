@@ -36,7 +36,7 @@ from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, absolute, less, maximum, minimum, sqrt
 from rotorfault.model.mixer import PairDemand, from_pairs, pair_demand
-from rotorfault.model.motion import limited
+from rotorfault.model.motion import lag_bandwidth, limited
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds, wrench_of
 
@@ -79,7 +79,6 @@ class ModelErrorMemory(NamedTuple):
     noise: Vec3  # rad^2/s^2: mean square of the innovations of the body rates
 
 
-@lru_cache(maxsize=64)
 def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
     """Standard deviation of a channel's deviation over that of its innovation, in 1/s.
 
@@ -89,6 +88,21 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
         Of the observer.
     period : float, s
         Of sampling; what is measured has white noise.
+    """
+    innovations, deviations = noise_energies(gain_rate, gain_deviation, period)
+    return math.sqrt(deviations / innovations)
+
+
+@lru_cache(maxsize=64)
+def noise_energies(gain_rate: float, gain_deviation: float, period: float) -> tuple[float, float]:
+    """Variances of a channel's innovation, and of its deviation in 1/s^2, over that of white noise measured.
+
+    Parameters
+    ----------
+    gain_rate, gain_deviation : float
+        Of the observer.
+    period : float, s
+        Of sampling.
     """
     # Responses to a single error of measurement, until nothing of it is left.
     rate = deviation = innovations = deviations = 0.0
@@ -100,7 +114,7 @@ def noise_gain(gain_rate: float, gain_deviation: float, period: float) -> float:
         deviations += deviation * deviation
         if k > 10 and abs(innovation) < 1e-9 and abs(deviation) < 1e-9 * gain_deviation:
             break
-    return math.sqrt(deviations / innovations)
+    return innovations, deviations
 
 
 def nothing_shown(rotors: int = 4) -> ModelErrorMemory:
@@ -133,8 +147,12 @@ def follow(
     dynamics : Dynamics
     """
     elapsed, kept = expectation.elapsed, 1.0 - dynamics.gain_rate
-    ahead = limited(vehicle, command) * vehicle.rotor_gain - expectation.thrust
-    lag = memory.lag * dynamics.lag_decay + ahead * (vehicle.rotor_bandwidth * elapsed)
+    entering = limited(vehicle, command)
+    ahead = entering * vehicle.rotor_gain - expectation.thrust
+    bandwidth = vehicle.rotor_bandwidth
+    if not isinstance(vehicle.rotor_bandwidth_down, tuple):
+        bandwidth = lag_bandwidth(vehicle, expectation.thrust / vehicle.rotor_gain, entering)
+    lag = memory.lag * dynamics.lag_decay + ahead * (bandwidth * elapsed)
 
     lag_innovation = memory.lag_innovation * kept + (lag - memory.lagging) * elapsed
     turned = expectation.now.omega_B - expectation.previous.omega_B
@@ -144,7 +162,7 @@ def follow(
     # A rotor that runs ahead of its model has also turned the body further the other way. Its speed is a root of its
     # thrust, so the difference is that of a share as large as bandwidths are wrong by.
     ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
-    ran_ahead = residual_speed(vehicle, ahead_of_model) - expectation.residual_speed
+    ran_ahead = _about_z(residual_speed(vehicle, ahead_of_model) - expectation.residual_speed)
     reaction = -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
     # On a vehicle without a reaction, which is known before the flight, nothing is remembered of it, and it is free.
     there = less(0.0, vehicle.rotor_reaction)
@@ -174,6 +192,11 @@ def follow(
     )
 
 
+def _about_z(residual: Scalar | Vec3) -> Scalar:
+    """Of a residual speed what lies along body z, where one torque matters most."""
+    return residual.z if isinstance(residual, Vec3) else residual
+
+
 class Misstated(NamedTuple):
     """Squares of the thrust by which a sound rotor may seem to fall behind others because the model is wrong."""
 
@@ -201,7 +224,7 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
     arm_12 = absolute(roll.D12) * torque.x + absolute(pitch.D12) * torque.y
     arm_34 = absolute(roll.D34) * torque.x + absolute(pitch.D34) * torque.y
     about_yaw = absolute(yaw.S12 - yaw.S34)
-    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    unlike = absolute(rate_against_rotors(vehicle, _about_z(residual_speed(vehicle, memory.spinning * flagged))))
     turned = 0.5 * (arm_12 + arm_34 + about_yaw * (torque.z + inertia.z * unlike))
     reacted = 0.5 * about_yaw * inertia.z * absolute(memory.reacting)
     least, most = memory.lagging.reduce(minimum), memory.lagging.reduce(maximum)
@@ -245,7 +268,7 @@ def torque_variances(
     inertia = vehicle.inertia
     squared = inertia.times(inertia) * (dynamics.noise_gain * dynamics.noise_gain)
     lagging = wrench_of(vehicle, memory.lagging).torque_B
-    unlike = absolute(rate_against_rotors(vehicle, residual_speed(vehicle, memory.spinning * flagged)))
+    unlike = absolute(rate_against_rotors(vehicle, _about_z(residual_speed(vehicle, memory.spinning * flagged))))
     own = Vec3(0.0, 0.0, inertia.z * unlike)
     reacted = Vec3(0.0, 0.0, inertia.z * absolute(memory.reacting))
     wrong = [

@@ -159,7 +159,7 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
 def _numbers(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
     flights, successes = int(variant.flights[at]), int(variant.successes[at])
     if not flights:
-        return ("no flights", f"hover physically possible: {possible_text(variant.possible, at)}")
+        return ("no flights", f"hover can be controlled: {possible_text(variant.possible, at)}")
     grades = ", ".join(f"{name} {n}" for name, n in zip(GRADES, _of(variant.grades, at), strict=True) if n)
     return (
         f"success {successes} of {flights}: {percent(variant.success_rate[at])} "
@@ -167,7 +167,7 @@ def _numbers(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
         grades,
         f"recovery time: {_quantiles(_of(variant.recovery, at), 's', 'never')}",
         f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'failed')}",
-        f"hover physically possible: {possible_text(variant.possible, at)}",
+        f"hover can be controlled: {possible_text(variant.possible, at)}",
     )
 
 
@@ -200,7 +200,7 @@ def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tup
 
 
 def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
-    """Whether hover is possible, in words."""
+    """Whether hover can be controlled, in words."""
     if possible is None:
         return "not known"
     words = {1.0: "yes", 0.0: "no"}

@@ -6,7 +6,7 @@ A map of three or four axes is looked at in slices, one for each combination of 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -174,18 +174,23 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
     Returns
     -------
     Edges or None
-        None where that is not known, or an axis of the slice has names instead of numbers.
+        None where that is not known, or no axis of the slice has numbers. Beside names it is a line for each of them.
     """
     flat = maps.views[:2]
-    if not all(view.numeric and len(view.values) > 1 for view in flat) or maps.variants[variant].possible is None:
+    if maps.variants[variant].possible is None or not any(view.numeric and len(view.values) > 1 for view in flat):
         return None
     further = {view.name: view.values[place] for view, place in zip(maps.views[2:], part.at[2:], strict=True)}
 
-    def possible(points: Array) -> Limits | None:
-        values = {view.name: column for view, column in zip(flat, points.T, strict=True)}
-        values |= {name: np.full(len(points), value) for name, value in further.items()}
-        return limits(maps.study, variant, values, middle=True)
+    def told(values: dict[str, NDArray[Any]]) -> Limits | None:
+        count = len(next(iter(values.values())))
+        others = {name: np.full(count, value) for name, value in further.items()}
+        return limits(maps.study, variant, {**values, **others}, middle=True)
 
+    def possible(points: Array) -> Limits | None:
+        return told({view.name: column for view, column in zip(flat, points.T, strict=True)})
+
+    if not all(view.numeric and len(view.values) > 1 for view in flat):
+        return _edges_beside_names(flat, told)
     fine = [np.linspace(view.positions[0], view.positions[-1], FINE) for view in flat]
     grid = np.stack(np.meshgrid(*fine, indexing="ij"), axis=-1)
     if (indicators := possible(grid.reshape(-1, len(flat)))) is None:
@@ -195,6 +200,37 @@ def edges(maps: Maps, variant: int, part: Slice) -> Edges | None:
         shaped = field.reshape(grid.shape[:-1])
         coarse = _steps(fine[0], shaped) if len(flat) == 1 else _contours(fine[0], fine[1], shaped, 0.5)
         lines.append([_refined(line, fine, partial(_indicator, possible, k)) for line in coarse])
+    return Edges(lines[0], lines[1])
+
+
+def _edges_beside_names(
+    flat: Sequence[View], told: Callable[[dict[str, NDArray[Any]]], Limits | None]
+) -> Edges | None:
+    """Limits along the one axis that has numbers, as a short line across each cell of the other."""
+    axis = 0 if flat[0].numeric and len(flat[0].values) > 1 else 1
+    view, names = flat[axis], flat[1 - axis]
+    named = np.array(names.values)
+
+    def at(x: Array, row: NDArray[np.intp]) -> Limits | None:
+        return told({view.name: x, names.name: named[row]})
+
+    x = np.linspace(view.positions[0], view.positions[-1], FINE)
+    rows = np.arange(len(named))
+    if (indicators := at(np.tile(x, len(named)), np.repeat(rows, FINE))) is None:
+        return None
+    lines: list[list[Array]] = []
+    for k, field in enumerate(indicators):
+        shaped = field.reshape(len(named), FINE)
+        row, place = np.nonzero(np.diff(shaped, axis=1))
+        inner, outer, inside = x[place], x[place + 1], shaped[row, place]
+        for _ in range(HALVINGS if len(row) else 0):
+            middle = 0.5 * (inner + outer)
+            there = at(middle, row)
+            assert there is not None  # as it was for the whole grid
+            same = there[k] == inside
+            inner, outer = np.where(same, middle, inner), np.where(same, outer, middle)
+        ends = [np.array([[e, p - 0.5], [e, p + 0.5]]) for e, p in zip(outer, names.positions[row], strict=True)]
+        lines.append([line if axis == 0 else line[:, ::-1] for line in ends])
     return Edges(lines[0], lines[1])
 
 

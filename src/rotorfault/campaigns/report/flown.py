@@ -18,7 +18,8 @@ from rotorfault.campaigns.report.maps import Maps, View
 from rotorfault.campaigns.study import Study
 from rotorfault.campaigns.varied import Draw
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.scenario.scenario import Mismatch, Scenario
+from rotorfault.scenario.mismatch import Mismatch
+from rotorfault.scenario.scenario import Scenario
 
 SEEDS = (
     "a flight's draws and seed follow from it, its cell and its number within the cell, and are the same for all "
@@ -186,15 +187,14 @@ def _vehicles(study: Study, names: Collection[str]) -> list[str]:
 
 def _vehicle(file: VehicleFile, mismatch: Mismatch) -> str:
     vehicle = file.vehicle
-    lift = vehicle.thrust_max * vehicle.rotor_gain * vehicle.rotors / (vehicle.mass * vehicle.gravity)
-    text = f"{file.name}: {vehicle.mass:.3g} kg, thrust-to-weight ratio {lift:.3g}"
+    text = f"{file.name}: {vehicle.mass:.3g} kg, thrust-to-weight ratio {file.thrust_to_weight:.3g}"
     text += f"; {file.description}" if file.description else ""
-    other = {
-        name: value
-        for name, value in mismatch.model_dump(mode="json").items()
-        if np.any(np.asarray(value, dtype=float) != 1.0)
-    }
-    return f"{text}; the true one differs from it by factors: {_settings(other)}" if other else text
+    factors = mismatch.model_dump(mode="json")
+    shift, curve = factors.pop("centre_of_mass"), factors.pop("thrust_curve")
+    other = {name: value for name, value in factors.items() if np.any(np.asarray(value, dtype=float) != 1.0)}
+    text += f"; the true one differs from it by factors: {_settings(other)}" if other else ""
+    text += f"; its true centre of mass is {shift} m beside the believed one" if any(shift) else ""
+    return text if curve is None else f"{text}; a of its true curve from signal to thrust is {curve:g}"
 
 
 def _scenario(study: Study) -> tuple[str, ...]:

@@ -1,11 +1,14 @@
-"""Where on a map hover is physically possible, whoever controls: `rotorfault.analysis.hover` for each cell.
+"""Where on a map hover can be controlled, whoever does it: `rotorfault.analysis.hover` for each cell.
+
+Controlled means more than possible: every small change of wrench about hover can be given, so that the control
+authority index (ACAI) is positive.
 
 What counts is the true vehicle with its mismatch, the losses that stay and the mean wind; faults and winds are asked
 for them. Gusts, rotor lag and the way from flight before the fault are not looked at: beyond the limit nothing stays
 in place for long, within it a controller may still fail.
 
-What a study draws is looked at by its ends: a cell in which hover is possible at some of them and not at others gets
-no answer. Of a normal draw the ends are three deviations away.
+What a study draws is looked at by its ends: a cell in which it can at some of them and not at others gets no answer.
+Of a normal draw the ends are three deviations away.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.analysis.hover import hover_margin
+from rotorfault.analysis.hover import hover_controlled
 from rotorfault.base.one_line import record_line
 from rotorfault.campaigns.axes import Columns, columns
 from rotorfault.campaigns.study import Study
@@ -27,7 +30,8 @@ from rotorfault.flight.assembly import Group, numbers_of
 from rotorfault.flight.sweep import checked_columns, groups_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.records import unflatten
+from rotorfault.maths.records import flatten, unflatten
+from rotorfault.model.likeness import alike, bare
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.scenario.scenario import Scenario
 
@@ -36,7 +40,7 @@ DEVIATIONS = 3.0
 
 
 class Limits(NamedTuple):
-    """Whether hover is possible: 1, 0, or NaN where it depends on what is drawn."""
+    """Whether hover can be controlled: 1, 0, or NaN where it depends on what is drawn."""
 
     with_yaw: Array
     without_yaw: Array
@@ -54,7 +58,7 @@ class Physics(NamedTuple):
 
 
 def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, middle: bool = False) -> Limits | None:
-    """Whether hover is possible at some values of a study's axes.
+    """Whether hover can be controlled at some values of a study's axes.
 
     Parameters
     ----------
@@ -86,8 +90,7 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
         physics = _physics(scenario, columns({**values, **drawn, **others}), count)
         if physics is None:
             return None
-        margin = hover_margin(*physics)
-        answers.append([np.broadcast_to(one, (count,)) for one in (margin.with_yaw, margin.without_yaw)])
+        answers.append([np.broadcast_to(one, (count,)) for one in hover_controlled(*physics)])
     possible = np.array(answers, dtype=float)  # (ends, 2, N)
     every, some = possible.min(axis=0), possible.max(axis=0)
     return Limits(*np.where(every == some, every, every if middle else np.nan))
@@ -123,11 +126,13 @@ def _physics(scenario: Scenario, varied: Columns, count: int) -> Physics | None:
         physics = _physics_of(group)
         if physics is None:
             return None
-        parts.append((group.flights, rows_of(physics, len(group.flights)), physics))
-    rows = np.empty((len(parts[0][1]), count))
-    for flights, some, _ in parts:
-        rows[:, flights] = some
-    return unflatten(parts[0][2], list(rows))
+        parts.append((group.flights, physics))
+    vehicles = alike([physics.vehicle for _, physics in parts])
+    found = [physics._replace(vehicle=vehicle) for (_, physics), vehicle in zip(parts, vehicles, strict=True)]
+    rows = np.empty((len(flatten(found[0])), count))
+    for (flights, _), physics in zip(parts, found, strict=True):
+        rows[:, flights] = rows_of(physics, len(flights))
+    return unflatten(found[0], list(rows))
 
 
 def _physics_of(group: Group) -> Physics | None:
@@ -140,6 +145,7 @@ def _physics_of(group: Group) -> Physics | None:
         lasting = np.where(fault.onset(record) < group.scenario.duration, 1.0 - loss, 1.0)
         remaining[fault.rotor - 1] = remaining[fault.rotor - 1] * lasting
     wind_W = loop.plant.wind.mean_velocity(numbers.parts.wind)
-    if wind_W is None:
+    # What a battery leaves of the greatest thrust depends on the flight.
+    if wind_W is None or loop.battery:
         return None
-    return Physics(numbers.vehicle, PerRotor.of(1.0 - share for share in remaining), wind_W)
+    return Physics(bare(numbers.vehicle), PerRotor.of(1.0 - share for share in remaining), wind_W)

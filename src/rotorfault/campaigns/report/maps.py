@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import LONGEST, cut, record_line
-from rotorfault.campaigns.axes import AXES
+from rotorfault.campaigns.axes import AXES, ROTOR_AXES
 from rotorfault.campaigns.flight_set import Counts
 from rotorfault.campaigns.grades import GRADES
 from rotorfault.campaigns.report.limits import Limits, limits
@@ -43,7 +43,6 @@ PROBABILITIES = (0.1, 0.5, 0.9)
 """Of the quantiles: least values within which at least this share of flights stays."""
 MOST_PAIRS = 6
 MOST_UNEVEN = 6.0  # longest over shortest step of an axis that is drawn to scale
-NAMES = ("rotor", "second_rotor")  # numbers that are names: nothing lies between two of them
 
 
 class View(NamedTuple):
@@ -99,7 +98,7 @@ class VariantMap(NamedTuple):
     recovery: Array  # s, (probabilities, ...); infinite where more do not recover, NaN where no rotor failed
     altitude: Array  # m, (probabilities, ...); infinite where more are no success, NaN where no rotor failed
     first_failure: Counts  # id of the first flight that was no success; -1 where all were
-    possible: Limits | None  # whether hover is physically possible
+    possible: Limits | None  # whether hover can be controlled
     total: Difference  # success rate over the whole map; of the first round
     shares: Array  # grades along the first axis, (grades, first); NaN where nothing was flown
     recovery_along: Array  # s, (probabilities, first)
@@ -194,7 +193,7 @@ def maps(study: Study, table: pa.Table) -> Maps:
 
 
 def _view(name: str, grid: list[float | str]) -> View:
-    numeric = name not in NAMES and all(isinstance(value, float) for value in grid)
+    numeric = name not in ROTOR_AXES and all(isinstance(value, float) for value in grid)
     order = np.argsort(np.array(grid, dtype=float), kind="stable") if numeric else np.arange(len(grid))
     return View(name, AXES[name].unit if name in AXES else "", [grid[i] for i in order], order, numeric)
 

@@ -36,7 +36,7 @@ MEANINGS = {
     "drifted": f"flew to its end, but more than {grades.BOUNDED:g} m off",
     "crashed": f"hit the ground faster than {grades.DESCENT:g} m/s, or tilted by more than "
     f"{np.degrees(grades.UPRIGHT):.0f} degrees",
-    "lost": "tumbled, tilted beyond 90 degrees in the air, or diverged: a state is not finite or 10 km away",
+    "lost": "tumbled, upside down in the air for half a second, or diverged: a state not finite or 10 km away",
 }
 
 
@@ -110,7 +110,7 @@ def _section(kind: str, title: str, part: str, spec: charts.Spec) -> dict[str, A
 
 
 def _possible(variant: VariantMap) -> tuple[str, str]:
-    """In how many cells hover is possible, with yaw held and with yaw given up."""
+    """In how many cells hover can be controlled, with yaw held and with yaw given up."""
     if variant.possible is None:
         return "not known", "not known"
     held, free = (_cells(each) for each in variant.possible)
@@ -118,6 +118,6 @@ def _possible(variant: VariantMap) -> tuple[str, str]:
 
 
 def _cells(possible: Array) -> str:
-    """In how many cells hover is possible."""
+    """In how many cells hover can be controlled."""
     depends = int(np.isnan(possible).sum())
     return f"{int(np.nansum(possible))} cells" + (f", in {depends} it depends on what is drawn" if depends else "")

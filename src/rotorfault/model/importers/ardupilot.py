@@ -19,6 +19,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.model.frames import ALIASES, FRAMES
 from rotorfault.model.importers.draft import Draft
 from rotorfault.model.importers.frame_match import distance, number_of
+from rotorfault.model.importers.numbers import quantity
 from rotorfault.model.importers.params_text import Params, read_params
 from rotorfault.model.vehicle_file import VehicleFile
 
@@ -70,7 +71,11 @@ def read_ardupilot(path: str | Path) -> Draft:
     about = f"{where}, parameters of ArduPilot"
     source = f"{where}: FRAME_CLASS {kind}, FRAME_TYPE {type_}"
     hover, least = _shares(params)
-    return Draft(where, about, (), {}, FRAMES[BY_NUMBERS[kind, type_]], source, hover, least)
+    known = {}
+    if params.has("MOT_THST_EXPO"):
+        expo = params.number("MOT_THST_EXPO")
+        known["thrust_curve"] = quantity("thrust_curve", expo, f"{where}: MOT_THST_EXPO")
+    return Draft(where, about, (), known, FRAMES[BY_NUMBERS[kind, type_]], source, hover, least)
 
 
 def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
@@ -85,6 +90,10 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
     InputError
         If ArduPilot has no frame with motors near its rotors that turn so.
     """
+    if vehicle.rotor_set.tilted:
+        raise InputError(
+            f"{vehicle.name}: has tilted rotors, and no frame of ArduPilot has any; export to px4, which takes them"
+        )
     fits = {
         name: numbers for name in BY_NUMBERS.values() if (numbers := number_of(vehicle, FRAMES[name])) is not None
     }
@@ -97,8 +106,7 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
     # The nearest; of those that are as near, the one that counts the motors as the vehicle does.
     best = min(fits, key=lambda name: (round(distance(vehicle, FRAMES[name], fits[name]), 3), fits[name] != order))
     kind, type_ = next(numbers for numbers, name in BY_NUMBERS.items() if name == best)
-    weight = vehicle.mass.value * vehicle.gravity.value
-    hover = weight / (len(vehicle.rotor) * vehicle.rotor_gain.value * vehicle.thrust_max.value)
+    hover = 1.0 / vehicle.thrust_to_weight
     motors = ", ".join(f"{rotor} is motor {number}" for rotor, number in enumerate(fits[best], start=1))
     lines = [
         f"# Vehicle '{vehicle.name}', written by rotorfault for ArduPilot: frame {best}, thrust in hover, no gains.",
@@ -107,6 +115,8 @@ def ardupilot_params(vehicle: VehicleFile) -> ArduPilotParams:
         f"FRAME_TYPE,{type_}",
         f"MOT_THST_HOVER,{hover:.9g}",
     ]
+    if vehicle.thrust_curve is not None:
+        lines.append(f"MOT_THST_EXPO,{vehicle.thrust_curve.value:.9g}")
     return ArduPilotParams("\n".join(lines) + "\n", best, fits[best], distance(vehicle, FRAMES[best], fits[best]))
 
 

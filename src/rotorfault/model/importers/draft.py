@@ -15,10 +15,10 @@ from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.model.frames import Frame, place_of
 from rotorfault.model.importers.estimates import Known, estimate_of
-from rotorfault.model.importers.numbers import GRAVITY, UNITS, Given, checked, quantity
-from rotorfault.model.quantities import Quantity
+from rotorfault.model.importers.numbers import GRAVITY, ORDER, UNITS, Given, checked, quantity, rotor_quantity
+from rotorfault.model.quantities import Quantity, RotorQuantity
 from rotorfault.model.vehicle_file import VehicleFile
-from rotorfault.model.vehicle_text import vehicle_text
+from rotorfault.model.vehicle_text import RotorText, vehicle_text
 
 ALWAYS = {
     "rotor_gain": Quantity(value=1.0, unit="1", source="our choice: commands are thrusts"),
@@ -51,6 +51,8 @@ class SourceRotor(NamedTuple):
     clockwise: bool  # whether its propeller turns so, seen from above
     source: str  # of the place
     level: str = ""  # "upper" or "lower" of two on one arm, where the source says it; else ""
+    z: float | None = None  # m, above the centre of mass, where the source says it
+    axis: tuple[float, float, float] | None = None  # unit vector along which it pulls; None if it points up
 
     @property
     def label(self) -> str:
@@ -65,12 +67,13 @@ class Draft(NamedTuple):
     where: str  # the source in messages
     about: str  # the source in words, for the head of the file
     rotors: tuple[SourceRotor, ...]  # in the order of the source; empty where only a frame is known
-    known: Mapping[str, Quantity]  # by key of the vehicle file
+    known: Mapping[str, Quantity | RotorQuantity]  # by key of the vehicle file
     frame: Frame | None = None  # that the source names instead of places; its arm is to be given
     frame_source: str = ""  # where it is named
     hover_share: tuple[float, str] | None = None  # thrust in hover over the greatest thrust, and its source
     least_share: tuple[float, str] | None = None  # least thrust over the greatest, and its source
     notes: tuple[str, ...] = ()  # what of the source is left out, a line each
+    air: tuple[tuple[str, Quantity], ...] = ()  # what the air does beyond linear drag, by key of the table [air]
 
 
 class Imported(NamedTuple):
@@ -104,7 +107,7 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
     given = checked(given)
     numbers = _with_given(draft, given)
     if "thrust_max" not in numbers and draft.hover_share is not None and "mass" in numbers:
-        numbers["thrust_max"] = _thrust_of_hover(draft, numbers["mass"].value)
+        numbers["thrust_max"] = _thrust_of_hover(draft, _one(numbers["mass"]))
     missing = [key for key in UNITS if key not in numbers and key != "thrust_min"]
     if not draft.rotors and given.arm is None:
         missing.append("arm")
@@ -116,16 +119,18 @@ def completed(draft: Draft, name: str, given: Given, estimate: bool) -> Imported
         numbers[key] = quantity(key, *estimate_of(key, _known(numbers, rotors, draft.where)))
     if "thrust_min" not in numbers:
         share, source = draft.least_share or (0.0, "our choice: rotors may stop")
-        numbers["thrust_min"] = quantity("thrust_min", _digits(share * numbers["thrust_max"].value), source)
+        least = [_digits(share * most) for most in _values(numbers["thrust_max"])]
+        numbers["thrust_min"] = rotor_quantity("thrust_min", least, source)
     text = vehicle_text(
         name,
         f"imported from {draft.about}",
         [f"Made by rotorfault from {draft.about}.", *draft.notes],
-        [(key, numbers[key]) for key in UNITS],
+        [(key, numbers[key]) for key in ORDER if key in numbers],
         [
-            (rotor.label, rotor.x, rotor.y, "+" if rotor.clockwise else "-", rotor.source)
-            for rotor in rotors
+            RotorText(one.label, one.x, one.y, "+" if one.clockwise else "-", one.source, one.z, one.axis)
+            for one in rotors
         ],
+        draft.air,
     )  # fmt: skip
     file = validate(VehicleFile, parse_toml(text, draft.where), draft.where)
     return Imported(file, text, rotors, draft.notes, tuple(estimated))
@@ -156,9 +161,25 @@ _FIRST = [
 ]
 
 
-def _with_given(draft: Draft, given: Given) -> dict[str, Quantity]:
+def _values(number: Quantity | RotorQuantity) -> tuple[float, ...]:
+    """All numbers that a quantity has."""
+    return number.values if isinstance(number, RotorQuantity) else (number.value,)
+
+
+def _one(number: Quantity | RotorQuantity) -> float:
+    """One number of a quantity: the mean of several."""
+    values = _values(number)
+    return values[0] if len(values) == 1 else math.fsum(values) / len(values)
+
+
+def _with_given(draft: Draft, given: Given) -> dict[str, Quantity | RotorQuantity]:
     """The numbers of a draft, and those of the user instead of them."""
     numbers = {**ALWAYS, **draft.known}
+    if given.inertia is not None:
+        # Who gives the moments gives the inertia.
+        numbers = {key: number for key, number in numbers.items() if not key.startswith("inertia_")}
+    if given.rotor_bandwidth is not None:
+        numbers.pop("rotor_bandwidth_down", None)
     if given.inertia is not None:
         for axis, value in zip("xyz", given.inertia, strict=True):
             numbers[f"inertia_{axis}"] = quantity(f"inertia_{axis}", value, "given at import: inertia")
@@ -174,9 +195,11 @@ def _thrust_of_hover(draft: Draft, mass: float) -> Quantity:
     """The greatest thrust of a rotor, of the share of it that hover takes."""
     assert draft.hover_share is not None
     share, source = draft.hover_share
-    count = len(draft.rotors) or len(draft.frame.motors if draft.frame else ())
+    # As many as pull upwards: of tilted rotors a part of each.
+    up = [1.0 if rotor.axis is None else max(rotor.axis[2], 0.0) for rotor in draft.rotors]
+    count = float(f"{math.fsum(up):.6g}") or len(draft.frame.motors if draft.frame else ())
     value = _digits(mass * GRAVITY / (count * share))
-    return quantity("thrust_max", value, f"weight of {mass:g} kg over {count} rotors and {share:.4g}, {source}")
+    return quantity("thrust_max", value, f"weight of {mass:g} kg over {count:g} rotors and {share:.4g}, {source}")
 
 
 def _rotors(draft: Draft, given: Given) -> tuple[SourceRotor, ...]:
@@ -203,19 +226,19 @@ def _rotors(draft: Draft, given: Given) -> tuple[SourceRotor, ...]:
     )
 
 
-def _known(numbers: Mapping[str, Quantity], rotors: tuple[SourceRotor, ...], where: str) -> Known:
+def _known(numbers: Mapping[str, Quantity | RotorQuantity], rotors: tuple[SourceRotor, ...], where: str) -> Known:
     """What estimates are made of."""
     thrust = numbers.get("thrust_coefficient")
     for key in ("mass", "thrust_coefficient"):
-        if key in numbers and not numbers[key].value > 0.0:
-            raise InputError(f"{where}: {key} is {numbers[key].value:g}; allowed: greater than 0")
+        if key in numbers and not min(_values(numbers[key])) > 0.0:
+            raise InputError(f"{where}: {key} is {min(_values(numbers[key])):g}; allowed: greater than 0")
     if len({(round(rotor.x, 4), round(rotor.y, 4)) for rotor in rotors}) < 2:
         raise InputError(f"{where}: all rotors are at one place; allowed: rotors about the centre of mass")
     return Known(
-        mass=numbers["mass"].value,
-        gravity=numbers["gravity"].value,
+        mass=_one(numbers["mass"]),
+        gravity=_one(numbers["gravity"]),
         places=[(rotor.x, rotor.y) for rotor in rotors],
-        thrust_coefficient=None if thrust is None else thrust.value,
+        thrust_coefficient=None if thrust is None else _one(thrust),
     )
 
 

@@ -23,10 +23,10 @@ def number_of(vehicle: VehicleFile, frame: Frame, exactly: bool = False) -> tupl
     """
     if len(vehicle.rotor) != len(frame.motors):
         return None
-    arm = max(math.hypot(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor)
+    arm = max(math.hypot(x, y) for x, y, _ in vehicle.places)
     left, found = list(frame.motors), []
-    for rotor in vehicle.rotor:
-        x, y = rotor.x.value / arm, rotor.y.value / arm
+    for rotor, place in zip(vehicle.rotor, vehicle.places, strict=True):
+        x, y = place[0] / arm, place[1] / arm
         turning = [motor for motor in left if motor.clockwise == (rotor.yaw == "+")]
         if not turning:
             return None
@@ -49,9 +49,9 @@ def distance(vehicle: VehicleFile, frame: Frame, numbers: tuple[int, ...]) -> fl
     numbers : tuple of int
         As `number_of` gives them.
     """
-    arm = max(math.hypot(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor)
+    arm = max(math.hypot(x, y) for x, y, _ in vehicle.places)
     motors = [frame.motors[number - 1] for number in numbers]
     return max(
-        math.hypot(rotor.x.value / arm - motor.x, rotor.y.value / arm - motor.y)
-        for rotor, motor in zip(vehicle.rotor, motors, strict=True)
+        math.hypot(x / arm - motor.x, y / arm - motor.y)
+        for (x, y, _), motor in zip(vehicle.places, motors, strict=True)
     )

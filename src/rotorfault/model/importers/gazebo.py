@@ -2,7 +2,8 @@
 
 A motor plugin names its link, the way it turns (``turningDirection``), the thrust per squared speed
 (``motorConstant``), drag torque over thrust (``momentConstant``), the greatest speed (``maxRotVelocity``) and two
-time constants, up and down, of which the mean becomes the one lag. Models have our axes: x forward, y left, z up.
+time constants, up and down. A rotor pulls along the z axis of its link. Models have our axes: x forward, y left, z
+up.
 
 Sources: the multicopter motor model of gz-sim, and that of RotorS, which it was made after.
 """
@@ -17,9 +18,9 @@ from typing import NamedTuple
 from rotorfault.base.errors import InputError
 from rotorfault.model.importers.bodies import Body, Pose, together
 from rotorfault.model.importers.draft import Draft, SourceRotor, levels
-from rotorfault.model.importers.numbers import GRAVITY, finite, quantity, same
+from rotorfault.model.importers.numbers import GRAVITY, finite, quantity, rotor_quantity, same
 from rotorfault.model.importers.xml_text import text_of
-from rotorfault.model.quantities import Quantity
+from rotorfault.model.quantities import Quantity, RotorQuantity
 from rotorfault.model.vehicle import MOST_ROTORS
 
 TILT = math.cos(math.radians(1.0))  # of a rotor's axis on the upward axis, at least
@@ -108,23 +109,24 @@ def draft_of(links: Mapping[str, Link], motors: list[Motor], where: str, about: 
     Raises
     ------
     InputError
-        If a motor is on no link or tilted, the model has no mass, or motors differ.
+        If a motor is on no link, or the model has no mass.
     """
     bodies = [link.body for link in links.values() if link.body is not None]
     for motor in motors:
         if motor.link not in links:
             raise InputError(f"{where}: a motor plugin names the link '{motor.link[:40]}', which there is not")
-        if links[motor.link].pose.turn[2, 2] < TILT:
-            raise InputError(f"{where}: link '{motor.link[:40]}' is tilted; allowed: rotors whose axis points up")
     if not bodies:
         raise InputError(f"{where}: no link has a mass; allowed: links with <inertial>")
     whole = together(bodies)
-    known: dict[str, Quantity] = {
+    known: dict[str, Quantity | RotorQuantity] = {
         "mass": quantity("mass", _digits(whole.mass), f"{where}: sum of {len(bodies)} links")
     }
     by_axes = f"{where}: {len(bodies)} links about their common centre of mass, by parallel axes"
     for k, axis in enumerate("xyz"):
         known[f"inertia_{axis}"] = quantity(f"inertia_{axis}", _digits(float(whole.inertia[k, k])), by_axes)
+    products = {axes: float(whole.inertia["xyz".index(axes[0]), "xyz".index(axes[1])]) for axes in ("xy", "xz", "yz")}
+    if max(map(abs, products.values())) > PRODUCT * min(float(whole.inertia[k, k]) for k in range(3)):
+        known |= {f"inertia_{axes}": quantity(f"inertia_{axes}", _digits(x), by_axes) for axes, x in products.items()}
     spinning = [links[motor.link] for motor in motors]
     turned = [float((p.turn.T @ b.inertia @ p.turn)[2, 2]) for p, b in spinning if b is not None]
     if len(turned) == len(motors):
@@ -135,53 +137,69 @@ def draft_of(links: Mapping[str, Link], motors: list[Motor], where: str, about: 
     rotors = tuple(
         SourceRotor(
             str(motor.number), _micrometres(place[0]), _micrometres(place[1]), motor.clockwise,
-            f"{where}: pose of link {motor.link}", level,
+            f"{where}: pose of link {motor.link}", level, _micrometres(place[2]), _axis(link.pose),
         )
-        for motor, place, level in zip(
-            motors, places, levels((float(x), float(y), float(z)) for x, y, z in places), strict=True
+        for motor, link, place, level in zip(
+            motors, spinning, places, levels((float(x), float(y), float(z)) for x, y, z in places), strict=True
         )
     )  # fmt: skip
-    return Draft(where, about, rotors, known, notes=_notes(whole))
+    return Draft(where, about, rotors, known)
 
 
-def _of_plugins(motors: list[Motor], mass: float, where: str) -> dict[str, Quantity]:
-    """What the motors say, which is to be the same for all."""
+def _axis(pose: Pose) -> tuple[float, float, float] | None:
+    """Along which a rotor on a link pulls; None if that is up."""
+    axis = pose.turn[:, 2]
+    if axis[2] >= TILT:
+        return None
+    x, y, z = (round(float(part), 9) + 0.0 for part in axis)
+    return x, y, z
 
-    def common(tag: str) -> float | None:
-        if not all(tag in motor.numbers for motor in motors):
-            return None
-        return same((motor.numbers[tag] for motor in motors), tag, where, "make the plugins alike")
 
-    known: dict[str, Quantity] = {}
-    thrust, torque, speed, drag = map(
-        common, ("motorConstant", "momentConstant", "maxRotVelocity", "rotorDragCoefficient")
-    )
-    if thrust is None or not thrust > 0.0:
-        raise InputError(f"{where}: motorConstant is {thrust!r}; allowed: in N/(rad/s)^2, above 0, in each plugin")
-    known["thrust_coefficient"] = quantity("thrust_coefficient", thrust, f"{where}: motorConstant")
-    if torque is not None:
-        known["torque_ratio"] = quantity("torque_ratio", torque, f"{where}: momentConstant")
-    if speed is not None:
-        source = f"{where}: motorConstant times the square of maxRotVelocity, {speed:g} rad/s"
-        known["thrust_max"] = quantity("thrust_max", _digits(thrust * speed * speed), source)
-    lags = [lag for tag in ("timeConstantUp", "timeConstantDown") if (lag := common(tag))]
-    if lags and min(lags) > 0.0:
-        mean = math.fsum(lags) / len(lags)
-        source = f"{where}: 1 over {mean:g} s, the mean of timeConstantUp and timeConstantDown"
-        known["rotor_bandwidth"] = quantity("rotor_bandwidth", _digits(1.0 / mean), source)
-    if drag is not None and mass > 0.0:
-        total = math.sqrt(len(motors) * mass * GRAVITY / thrust)
-        source = f"{where}: rotorDragCoefficient times the sum of rotor speeds in hover, {total:.4g} rad/s"
-        known["linear_drag"] = quantity("linear_drag", float(f"{drag * total:.4g}"), source)
+def _of_plugins(motors: list[Motor], mass: float, where: str) -> dict[str, Quantity | RotorQuantity]:
+    """What the motors say, of each where they differ."""
+
+    def each(tag: str) -> list[float]:
+        return [motor.numbers[tag] for motor in motors if tag in motor.numbers]
+
+    known: dict[str, Quantity | RotorQuantity] = {}
+
+    def take(key: str, values: list[float], source: str) -> None:
+        if len(values) == len(motors):
+            known[key] = rotor_quantity(key, values, source)
+
+    thrust, torque, speed = map(each, ("motorConstant", "momentConstant", "maxRotVelocity"))
+    if not min(thrust) > 0.0:
+        raise InputError(
+            f"{where}: motorConstant is {min(thrust)!r}; allowed: in N/(rad/s)^2, above 0, in each plugin"
+        )
+    take("thrust_coefficient", thrust, f"{where}: motorConstant")
+    take("torque_ratio", torque, f"{where}: momentConstant")
+    if len(speed) == len(motors):
+        source = f"{where}: motorConstant times the square of maxRotVelocity, up to {max(speed):g} rad/s"
+        take("thrust_max", [_digits(b * w * w) for b, w in zip(thrust, speed, strict=True)], source)
+    up, down = (_lags(each(tag), len(motors)) for tag in ("timeConstantUp", "timeConstantDown"))
+    if up or down:
+        source = f"{where}: 1 over timeConstant{'Up' if up else 'Down'}"
+        known["rotor_bandwidth"] = rotor_quantity("rotor_bandwidth", up or down, source)
+    if up and down and up != down:
+        known["rotor_bandwidth_down"] = rotor_quantity(
+            "rotor_bandwidth_down", down, f"{where}: 1 over timeConstantDown"
+        )
+    drag = each("rotorDragCoefficient")
+    if len(drag) == len(motors) and mass > 0.0:
+        share = mass * GRAVITY / len(motors)
+        speeds = [math.sqrt(share / b) for b in thrust]
+        source = f"{where}: rotorDragCoefficient times rotor speeds in hover, {math.fsum(speeds):.4g} rad/s in all"
+        total = math.fsum(d * w for d, w in zip(drag, speeds, strict=True))
+        known["linear_drag"] = quantity("linear_drag", float(f"{total:.4g}"), source)
     return known
 
 
-def _notes(whole: Body) -> tuple[str, ...]:
-    left = ["heights of the rotors and of the centre of mass"]
-    products = [abs(float(whole.inertia[i, k])) for i, k in ((0, 1), (0, 2), (1, 2))]
-    if max(products) > PRODUCT * min(float(whole.inertia[k, k]) for k in range(3)):
-        left.append(f"products of inertia, up to {max(products):.3g} kg m^2")
-    return (f"Left out, for the model has none of it: {', '.join(left)}.",)
+def _lags(lags: list[float], rotors: int) -> list[float]:
+    """Bandwidths in rad/s for time constants in s; none where one is missing or 0."""
+    if len(lags) < rotors or not min(lags) > 0.0:
+        return []
+    return [_digits(1.0 / lag) for lag in lags]
 
 
 def _digits(value: float) -> float:

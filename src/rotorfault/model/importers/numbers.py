@@ -1,4 +1,4 @@
-"""Numbers on their way into a vehicle file: with the unit of their key, finite, the same for all rotors."""
+"""Numbers on their way into a vehicle file: with the unit of their key, finite, one for all rotors or for each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from rotorfault.base.errors import InputError, short
 from rotorfault.base.number_rule import plain_number, real
-from rotorfault.model.quantities import Quantity
+from rotorfault.model.quantities import Quantity, RotorQuantity
 
 UNITS = {
     "mass": "kg",
@@ -28,7 +28,23 @@ UNITS = {
     "gravity": "m/s^2",
     "rotor_reaction": "1",
 }
-"""Numbers of a vehicle in the order of its file, with their units."""
+"""Numbers that each vehicle has, in the order of its file, with their units."""
+OPTIONAL = {
+    "inertia_xy": "kg m^2",
+    "inertia_xz": "kg m^2",
+    "inertia_yz": "kg m^2",
+    "rotor_bandwidth_down": "rad/s",
+    "thrust_curve": "1",
+    "rotor_radius": "m",
+}
+"""Numbers that it may have; nobody is asked for them."""
+AFTER = {
+    "inertia_z": ("inertia_xy", "inertia_xz", "inertia_yz"),
+    "rotor_bandwidth": ("rotor_bandwidth_down",),
+    "rotor_reaction": ("thrust_curve", "rotor_radius"),
+}
+ORDER = [key for required in UNITS for key in (required, *AFTER.get(required, ()))]
+"""All of them in the order of the file."""
 
 GRAVITY = 9.81
 
@@ -64,9 +80,40 @@ def quantity(key: str, value: float, source: str) -> Quantity:
     InputError
         If it is not finite.
     """
-    if not math.isfinite(value):
-        raise InputError(f"{source}: {key} is {value}; allowed: a finite number")
-    return Quantity(value=value, unit=UNITS[key], source=source)
+    _require_finite(key, (value,), source)
+    return Quantity(value=value, unit=_UNIT[key], source=source)
+
+
+def rotor_quantity(key: str, values: Iterable[float], source: str) -> RotorQuantity:
+    """A number of the rotors with the unit of its key: one where all have the same, to a part in a thousand.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``"thrust_max"``.
+    values : iterable of float
+        Of each rotor, in the unit of the key.
+    source : str
+
+    Raises
+    ------
+    InputError
+        If one is not finite.
+    """
+    found = tuple(values)
+    _require_finite(key, found, source)
+    one = max(found) - min(found) <= SAME * max(map(abs, found))
+    return RotorQuantity(value=found[0] if one else found, unit=_UNIT[key], source=source)
+
+
+def _require_finite(key: str, values: tuple[float, ...], source: str) -> None:
+    for value in values:
+        if not math.isfinite(value):
+            raise InputError(f"{source}: {key} is {value}; allowed: a finite number")
+
+
+_UNIT = UNITS | OPTIONAL
+SAME = 1e-3  # relative: by as much numbers of rotors may differ and count as one
 
 
 def same(values: Iterable[float], what: str, where: str, hint: str) -> float:
@@ -88,7 +135,7 @@ def same(values: Iterable[float], what: str, where: str, hint: str) -> float:
         If they differ.
     """
     found = list(values)
-    if max(found) - min(found) > 1e-3 * max(map(abs, found)):
+    if max(found) - min(found) > SAME * max(map(abs, found)):
         raise InputError(
             f"{where}: {what} differs between rotors ({min(found):g} to {max(found):g}); a vehicle has one: {hint}"
         )

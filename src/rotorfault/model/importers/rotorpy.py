@@ -2,8 +2,9 @@
 
 RotorPy has our axes, and its ``rotor_directions`` are our yaw signs: +1 pushes the body towards positive yaw, by a
 propeller that turns clockwise. ``k_eta`` is the thrust coefficient, ``k_m`` the drag torque per squared speed,
-``tau_m`` the lag of the motors, ``k_d`` the rotor drag, of which the drag in hover is kept: k_d times the sum of
-rotor speeds.
+``tau_m`` the lag of the motors. What the air does (``k_d``, ``k_z``, ``k_h``, ``k_flap``, ``c_Dx``, ``c_Dy``,
+``c_Dz``) goes into the table ``[air]``, whose terms are RotorPy's. A lag of the motors' speed is taken as one of
+thrust, the same for small changes.
 
 No code of the source runs: its text is read, and of it numbers, strings, lists, dictionaries, names that were
 assigned before, the four operations, and NumPy's ``array``, ``sqrt``, ``sin``, ``cos`` and ``pi``. What is more is
@@ -25,7 +26,7 @@ from rotorfault.base import foreign
 from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError
 from rotorfault.model.importers.draft import Draft, SourceRotor, levels
-from rotorfault.model.importers.numbers import GRAVITY, quantity, real_or_nan
+from rotorfault.model.importers.numbers import quantity, real_or_nan
 from rotorfault.model.quantities import Quantity
 from rotorfault.model.vehicle import MOST_ROTORS
 
@@ -36,12 +37,12 @@ OPERATIONS = {
     ast.Mult: lambda a, b: a * b,
     ast.Div: lambda a, b: a / b,
 }
-LEFT_OUT = {
-    "k_z": "inflow", "k_h": "translational lift", "k_flap": "flapping", "c_Dx": "quadratic drag",
-    "c_Dy": "quadratic drag", "c_Dz": "quadratic drag", "Ixy": "products of inertia", "Ixz": "products of inertia",
-    "Iyz": "products of inertia",
+AIR = {
+    "k_d": ("rotor_drag", "kg/rad"), "k_z": ("inflow", "kg/rad"), "k_h": ("translational_lift", "kg/m"),
+    "k_flap": ("flapping", "kg m/rad"), "c_Dx": ("frame_drag_x", "kg/m"), "c_Dy": ("frame_drag_y", "kg/m"),
+    "c_Dz": ("frame_drag_z", "kg/m"),
 }  # fmt: skip
-"""Numbers of RotorPy that the model has no place for."""
+"""RotorPy's numbers of the air: key of the table ``[air]`` and unit, which is theirs."""
 
 
 class NotReadError(Exception):
@@ -191,9 +192,11 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
     if any(abs(sign) != 1.0 for sign in signs):
         raise InputError(f"{where}: rotor_directions is {signs}; allowed: 1 and -1")
     heights = levels((x, y, z) for x, y, z in places)
+    air = _air(found, where)
+    high = any(abs(z) > 1e-9 for _, _, z in places)
     rotors = tuple(
-        SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level)
-        for name, (x, y, _), sign, level in zip(positions, places, signs, heights, strict=True)
+        SourceRotor(str(name), x, y, sign > 0.0, f"{where}: rotor_pos", level, z if high else None)
+        for name, (x, y, z), sign, level in zip(positions, places, signs, heights, strict=True)
     )
     known: dict[str, Quantity] = {}
 
@@ -203,9 +206,12 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
             known[key] = quantity(key, number, f"{where}: {name}{how}")
         return number
 
-    mass = take("mass", "mass")
+    take("mass", "mass")
     for axis in "xyz":
         take(f"inertia_{axis}", f"I{axis * 2}")
+    for axes in ("xy", "xz", "yz"):
+        if _number(found, f"I{axes}", where):
+            take(f"inertia_{axes}", f"I{axes}")
     thrust, torque = take("thrust_coefficient", "k_eta"), _number(found, "k_m", where)
     if thrust and torque is not None:
         take("torque_ratio", "k_m", " over k_eta", torque / thrust)
@@ -216,20 +222,20 @@ def _draft(found: Mapping[Any, Any], where: str) -> Draft:
         speed = _number(found, name, where)
         if speed is not None and thrust:
             take(key, name, " squared, times k_eta", thrust * speed * speed)
-    drag = _number(found, "k_d", where)
-    if drag and mass and thrust and mass > 0.0 and thrust > 0.0:
-        total = math.sqrt(len(rotors) * mass * GRAVITY / thrust)
-        take(
-            "linear_drag",
-            "k_d",
-            f" times the sum of rotor speeds in hover, {total:.4g} rad/s",
-            float(f"{drag * total:.4g}"),
-        )
-    left = sorted({LEFT_OUT[name] for name in LEFT_OUT if _number(found, name, where)})
-    if any(abs(z) > 1e-9 for _, _, z in places):
-        left.append("heights of the rotors")
-    notes = (f"Left out, for the model has none of it: {', '.join(left)}.",) if left else ()
-    return Draft(where, f"{where}, parameters of RotorPy", rotors, known, notes=notes)
+    take("rotor_radius", "rotor_radius")
+    if air:
+        take("linear_drag", "k_d", ": none beside the drag in [air]", 0.0)
+    return Draft(where, f"{where}, parameters of RotorPy", rotors, known, air=air)
+
+
+def _air(found: Mapping[Any, Any], where: str) -> tuple[tuple[str, Quantity], ...]:
+    """What the air does, without what is 0."""
+    numbers = ((name, _number(found, name, where)) for name in AIR)
+    return tuple(
+        (AIR[name][0], Quantity(value=number, unit=AIR[name][1], source=f"{where}: {name}"))
+        for name, number in numbers
+        if number
+    )
 
 
 def _number(found: Mapping[Any, Any], name: str, where: str) -> float | None:

@@ -69,7 +69,7 @@ def schema(name: str) -> dict[str, Any]:
 
 def scene(vehicle: VehicleFile, stamp: Mapping[str, int]) -> dict[str, Any]:
     """The vehicle as it is drawn: arms, discs coloured by the way they turn, numbers."""
-    places = [(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor]
+    places = [(x, y) for x, y, _ in vehicle.places]
     apart = min((math.dist(a, b) for k, a in enumerate(places) for b in places[k + 1 :]), default=1.0)
     reach = _reach(vehicle)
     discs, arms, texts = [], [], []
@@ -89,22 +89,30 @@ def scene(vehicle: VehicleFile, stamp: Mapping[str, int]) -> dict[str, Any]:
 
 
 def thrust_arrows(vehicle: VehicleFile, thrust: Sequence[float], stamp: Mapping[str, int]) -> dict[str, Any]:
-    """An arrow per rotor as long as its thrust, up the body's z axis; down where it is negative."""
+    """An arrow per rotor as long as its thrust, along its axis; the other way where it is negative."""
     reach = _reach(vehicle)
-    up = {"x": 0.0, "y": -math.sqrt(0.5), "z": 0.0, "w": math.sqrt(0.5)}  # turns x, along which arrows lie, to z
-    down = {**up, "y": -up["y"]}
     arrows = [
         _arrow(
-            (rotor.x.value, rotor.y.value, 0.0), LENGTH * reach * abs(force) / vehicle.thrust_max.value, 0.05 * reach,
-            up if force >= 0.0 else down, BLUE,
+            (x, y, 0.0), LENGTH * reach * abs(force) / max(vehicle.thrust_max.values), 0.05 * reach,
+            along(axis, force < 0.0), BLUE,
         )
-        for rotor, force in zip(vehicle.rotor, thrust, strict=True)
+        for (x, y, _), axis, force in zip(vehicle.places, vehicle.axes, thrust, strict=True)
     ]  # fmt: skip
     return _update("thrust", stamp, arrows=arrows)
 
 
+def along(axis: tuple[float, float, float], back: bool) -> dict[str, float]:
+    """The quaternion that turns x, along which arrows lie, to an axis of a rotor, or to the way back."""
+    x, y, z = (-a for a in axis) if back else axis
+    # Half way between x and the axis; straight back, any half turn does.
+    w = math.sqrt(max(0.5 * (1.0 + x), 0.0))
+    if w < 1e-9:
+        return {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}
+    return {"x": 0.0, "y": -0.5 * z / w, "z": 0.5 * y / w, "w": w}
+
+
 def _reach(vehicle: VehicleFile) -> float:
-    return max(math.hypot(rotor.x.value, rotor.y.value) for rotor in vehicle.rotor)
+    return max(math.hypot(x, y) for x, y, _ in vehicle.places)
 
 
 def _pose(x: float, y: float, z: float) -> dict[str, Any]:

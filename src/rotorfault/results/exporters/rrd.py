@@ -102,7 +102,7 @@ def _motion(rr: Any, stream: Any, data: FlightData, time: Any) -> None:
 
 
 def _vehicle(rr: Any, stream: Any, file: VehicleFile) -> None:
-    places = np.array([(rotor.x.value, rotor.y.value, 0.0) for rotor in file.rotor])
+    places = np.array([(x, y, 0.0) for x, y, _ in file.places])
     reach = float(np.hypot(*places.T[:2]).max())
     colours = [BLUE if rotor.yaw == "+" else VERMILION for rotor in file.rotor]
     names = [one_line(f"{number} {rotor.name}".strip()) for number, rotor in enumerate(file.rotor, start=1)]
@@ -118,15 +118,14 @@ def _vehicle(rr: Any, stream: Any, file: VehicleFile) -> None:
 
 def _thrusts(rr: Any, stream: Any, data: FlightData, time: Any, file: VehicleFile) -> None:
     """Arrows of true thrust, and of the one that is believed, at each rotor."""
-    places = np.array([(rotor.x.value, rotor.y.value, 0.0) for rotor in file.rotor])
-    reach, most = float(np.hypot(*places.T[:2]).max()), file.thrust_max.value
+    places = np.array([(x, y, 0.0) for x, y, _ in file.places])
+    reach, most = float(np.hypot(*places.T[:2]).max()), max(file.thrust_max.values)
     believed = believed_thrust(data)
     true = np.asarray(data["thrust"].values) if "thrust" in data else None
     for name, thrust, colour in (("thrust", true, BLUE), ("thrust_believed", believed, ORANGE)):
         if thrust is None or thrust.shape[1] != len(places):
             continue
-        vectors = np.zeros((*thrust.shape, 3))
-        vectors[..., 2] = np.nan_to_num(thrust) * LENGTH * reach / most
+        vectors = np.nan_to_num(thrust)[..., None] * np.array(file.axes) * (LENGTH * reach / most)
         count = [len(places)] * len(thrust)
         columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3), origins=np.tile(places, (len(thrust), 1)))
         rr.send_columns(f"world/vehicle/{name}", [time], columns.partition(count), recording=stream)

@@ -19,6 +19,7 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.loop.scores import SETTLED
 from rotorfault.maths.arrays import ANGLES, Array
 from rotorfault.maths.geometry import PerRotor
+from rotorfault.model.motion import mean_bandwidth
 from rotorfault.model.vehicle import Vehicle, wrench_of
 from rotorfault.reference import REFERENCE
 from rotorfault.results.metrics import attitude_error, cost, lyapunov_violations
@@ -58,7 +59,7 @@ def measure(data: xr.Dataset) -> dict[str, Any]:
     attitude = data["attitude"].values
     error = data["position"].values - data["position_reference"].values
     return {
-        "chattering": chattering(time, command, 1.5 * vehicle.rotor_bandwidth),
+        "chattering": chattering(time, command, 1.5 * mean_bandwidth(vehicle)),
         "outside_layer": outside_layer(data, scenario),
         "rotor_speed": _spread(speed, time),
         "control": _spread(command, time),

@@ -1,0 +1,306 @@
+r"""Hover where yaw cannot be held: a spinning body whose thrust axis the same SDRE law steers.
+
+**The axis.** Upright, with the body's z axis along the wanted thrust, a quadrotor without one rotor leaves the rotor
+opposite nothing to do: it stands still and can push one way only. Turning steadily about an axis n that is fixed in
+the body but not z, its rotors have thrusts of our choice (relaxed hover, `rotorfault.analysis.relaxed_hover`). At a
+yaw rate r that axis follows from the torque that is wanted in balance, without a search: with
+:math:`\omega = (p, q, r)` parallel to n,
+
+.. math:: \tau_x + ((J_y - J_z)r - J_r\Omega)\,q - d_xp = 0, \qquad
+          \tau_y + ((J_z - J_x)r + J_r\Omega)\,p - d_yq = 0
+
+with d the damping of roll and pitch, and tau the tilt torque of the thrusts wanted in balance: between those without
+any tilt torque, which may be below zero, and those of all believed rotors at the same share of what they can give,
+the first at which each living rotor keeps a `reserve`. Products of inertia and tilted rotors add to tau and d what
+is linear in p and q. r is the measured yaw rate: it finds its own balance between
+the rotors' drag torque and the air.
+
+**The law.** Error, rates and torque are seen in a frame whose z axis is n, roll and pitch of it as one complex
+number. Its gains solve the Riccati equation of `rotorfault.autopilot.control.spin_riccati`, whose states are error,
+rate and the angular acceleration that the lagging rotors give, with the weights (35) of roll and pitch, their means.
+What it leaves to feed-forward is the balance of the turning itself, with the believed inertia as it is; the switching
+input of the sliding surface is added as elsewhere.
+
+**When.** How much of yaw is given up goes from 0 to 1 as the thrust that believed rotors have with yaw in balance
+falls from the weight to `YAW_LOST` of it. The torque is shared between the law that holds yaw and this one in that
+ratio, and the axis moves from z to n with the time constant `time`, so nothing jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from rotorfault.autopilot.control.spin_riccati import (
+    Complex,
+    Poles,
+    SpinProblem,
+    improve,
+    optimal,
+    spin_gain,
+)
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
+from rotorfault.maths.rotation import Quat
+from rotorfault.maths.scalar import Scalar, clip, greater, maximum, minimum, select, sqrt
+from rotorfault.model.aerodynamics import Aerodynamics
+from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.motion import effect_of, mean_bandwidth, torque_of_motion
+from rotorfault.model.signals import Diagnosis, Wrench
+from rotorfault.model.vehicle import Vehicle, body_momentum, over_inertia, rotor_momentum, wrench_of
+
+YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that holds yaw loses a metre in two seconds
+LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
+RIDGE = 1e-6  # relative
+MOST = 10.0  # of the weight: more thrust than is ever asked for
+
+
+class RelaxedSettings(Strict):
+    """How it hovers where yaw cannot be held."""
+
+    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust.
+    reserve: float = Field(
+        default=0.3, ge=0.0, le=1.0, description="least thrust of a living rotor, as a share of equal ones"
+    )
+    # 20 degrees: costs 6 % of lift.
+    lean: float = Field(default=0.35, gt=0.0, lt=1.5, description="largest angle of the axis to body z [rad]")
+    time: float = Field(default=0.5, gt=0.0, description="time constant with which the axis moves [s]")
+
+
+class SpinWeights(NamedTuple):
+    """Weights of roll and pitch, their means."""
+
+    angle: Scalar  # 1/s^4: q of the angle over r
+    rate: Scalar  # 1/s^2: q of the rate over r
+
+
+class RelaxedParameters(NamedTuple):
+    """Numbers of relaxed hover."""
+
+    reserve: Scalar
+    lean: Scalar  # tangent
+    time: Scalar  # s
+    weights: SpinWeights
+
+
+class RelaxedMemory(NamedTuple):
+    """Axis and gain of relaxed hover."""
+
+    lean: Vec3  # (n_x, n_y)/n_z, and 0
+    poles: Poles  # of the closed loop
+
+
+class RelaxedAxis(NamedTuple):
+    """The axis at one sampling instant."""
+
+    memory: RelaxedMemory
+    given_up: Scalar  # 0 to 1: share of yaw
+    thrust: Scalar  # N: most that the believed rotors give together in the balance of the axis
+    to_B: Mat3  # from the frame with n for its z axis to the body's
+    turn: Quat  # the same
+
+
+class TurningError(NamedTuple):
+    """What relaxed hover corrects, in the frame with n for its z axis."""
+
+    e: Vec3  # rad: of the thrust axis
+    omega: Vec3  # rad/s: of the body
+    rate: Vec3  # rad/s: wanted about x and y
+    acceleration: Vec3  # rad/s^2: derivative of the wanted rate, as seen from the world
+
+
+def relaxed_parameters(settings: RelaxedSettings, weights: SpinWeights) -> RelaxedParameters:
+    """Numbers of the settings as a record."""
+    return RelaxedParameters(settings.reserve, math.tan(settings.lean), settings.time, weights)
+
+
+def at_rest(parameters: RelaxedParameters, vehicle: Vehicle) -> RelaxedMemory:
+    """The body's z axis, and the gain of a body that does not spin."""
+    weights = parameters.weights
+    return RelaxedMemory(
+        zeros(), optimal(SpinProblem(0.0, 0.0, mean_bandwidth(vehicle), weights.angle, weights.rate))
+    )
+
+
+def relaxed_axis(
+    memory: RelaxedMemory,
+    vehicle: Vehicle,
+    believed: Diagnosis,
+    with_yaw: Scalar,
+    omega_B: Vec3,
+    residual_speed: Scalar | Vec3,
+    parameters: RelaxedParameters,
+    dt: Scalar,
+) -> RelaxedAxis:
+    """The axis that is to point along the wanted thrust.
+
+    Parameters
+    ----------
+    memory : RelaxedMemory
+    vehicle : Vehicle
+        As believed.
+    believed : Diagnosis
+        Of its rotors.
+    with_yaw : scalar, N
+        Thrust that the believed rotors have with yaw in balance.
+    omega_B : Vec3, rad/s
+        Body rates.
+    residual_speed : scalar, rad/s
+        Believed Omega of (4); of tilted rotors its vector.
+    parameters : RelaxedParameters
+    dt : scalar, s
+        Sampling period.
+    """
+    weight = vehicle.mass * vehicle.gravity
+    given_up = clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
+    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
+    balance = _balanced_thrust(vehicle, able, parameters.reserve)
+
+    def room(most: Scalar, thrust: Scalar) -> Scalar:
+        # A dead rotor bounds nothing.
+        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
+
+    most = able.map(room, balance).reduce(minimum) * weight
+    tau = wrench_of(vehicle, balance).torque_B
+    wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
+    size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
+    wanted = wanted * minimum(parameters.lean / size, 1.0)
+    lean = memory.lean + (wanted - memory.lean) * (dt / (parameters.time + dt))
+    # The shortest turn from z to n.
+    z = 1.0 / sqrt(1.0 + lean.x * lean.x + lean.y * lean.y)
+    x, y = lean.x * z, lean.y * z
+    k = 1.0 / (1.0 + z)
+    w = sqrt(0.5 * (1.0 + z))
+    half = 0.5 / w
+    to_B = Mat3(
+        1.0 - x * x * k, -x * y * k, x,
+        -x * y * k, 1.0 - y * y * k, y,
+        -x, -y, z,
+    )  # fmt: skip
+    turn = Quat(w, -y * half, x * half, 0.0)
+    return RelaxedAxis(memory._replace(lean=lean), given_up, most, to_B, turn)
+
+
+def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:
+    """Thrusts in N with which the believed rotors carry the weight, each living one with its reserve."""
+    weight = vehicle.mass * vehicle.gravity
+    # Where nothing lives the sum is 0; the floor keeps the quotient a number.
+    most = able.sum() if vehicle.tilt == () else able.dot(effectiveness(vehicle).thrust)
+    alike: PerRotor = able * (weight / maximum(most, 1e-3 * weight))
+    level = _thrusts_for(vehicle, able, Wrench(weight, zeros()))
+    short, room = alike * reserve - level, alike - level
+    share = short.map(lambda lacks, r: select(greater(lacks, 0.0), lacks / maximum(r, 1e-9 * weight), 0.0), room)
+    push = minimum(share.reduce(maximum), 1.0)
+    balance: PerRotor = level + room * push
+    return balance
+
+
+def _thrusts_for(vehicle: Vehicle, able: PerRotor, wrench: Wrench) -> PerRotor:
+    """Thrusts in N that give a thrust and tilt torque, least squares by what rotors can give, yaw left open."""
+    rows = effectiveness(vehicle)[:3]
+    xx, xy, xz, yy, yz, zz = ((rows[i] * rows[j]).dot(able) for i in range(3) for j in range(i, 3))
+    # Of rotors in one line an axis is out of reach: a millionth of ridge, and nothing is asked of it. The floors keep
+    # it a number where nothing lives.
+    ridge = RIDGE * maximum(yy + zz, 1e-9)
+    M = Mat3(xx, xy, xz, xy, yy + ridge, yz, xz, yz, zz + ridge)
+    per = M.adjugate() @ Vec3(wrench.thrust, wrench.torque_B.x, wrench.torque_B.y)
+    per = per * (1.0 / maximum(M.det(), 1e-9 * ridge * ridge))
+    thrust: PerRotor = (rows[0] * per.x + rows[1] * per.y + rows[2] * per.z) * able
+    return thrust
+
+
+def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench) -> Wrench:
+    """The wrench that comes of a thrust and tilt torque when each rotor is put within its limits.
+
+    An allocation that serves tilt before thrust would stop all rotors for a torque that they can only work against.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    believed : Diagnosis
+        Of its rotors.
+    wrench : Wrench
+        Wanted; its yaw torque is not looked at.
+    """
+    effect = effect_of(vehicle, believed.loss, believed.stuck)
+    low, high = effect * vehicle.thrust_min, effect * vehicle.thrust_max
+    held = believed.stuck.thrust
+    moving = wrench_of(vehicle, held)
+    left = Wrench(wrench.thrust - moving.thrust, wrench.torque_B - moving.torque_B)
+    return wrench_of(vehicle, _thrusts_for(vehicle, high, left).map(clip, low, high) + held)
+
+
+def _wanted_lean(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar | Vec3) -> Vec3:
+    """(n_x, n_y)/n_z of the axis about which a spinning body balances a tilt torque."""
+    J, momentum = vehicle.inertia, rotor_momentum(vehicle, residual_speed)
+    d = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
+    # What does not go by p and q turns a body whose axes are no principal ones, or whose rotors are tilted.
+    if isinstance(vehicle.inertia_products, Vec3):
+        xy, xz, yz = vehicle.inertia_products * spin
+        tau, d = tau + Vec3(yz, -xz, 0.0) * spin, Vec3(d.x - xy, d.y + xy, d.z)
+    if isinstance(momentum, Vec3):
+        tau, momentum = tau + Vec3(momentum.y, -momentum.x, 0.0) * spin, momentum.z
+    cx, cy = (J.y - J.z) * spin - momentum, (J.z - J.x) * spin + momentum
+    # (p, q)/r by Cramer's rule. Where the body hardly turns, or has no balance, the floors keep it finite.
+    fast = maximum(spin * spin, LEAST_RATE * LEAST_RATE)
+    tiny = 1e-6 * (J.x * J.y) * LEAST_RATE * LEAST_RATE
+    scale = spin / (maximum(d.x * d.y - cx * cy, tiny) * fast)
+    return Vec3((d.y * tau.x + cx * tau.y) * scale, (cy * tau.x + d.x * tau.y) * scale, 0.0)
+
+
+def relaxed_torque(
+    axis: RelaxedAxis,
+    error: TurningError,
+    given_B: Vec3,
+    switching_B: Vec3,
+    vehicle: Vehicle,
+    residual_speed: Scalar | Vec3,
+    parameters: RelaxedParameters,
+) -> tuple[RelaxedMemory, Vec3]:
+    """Torque that steers the axis, and the memory of the next instant.
+
+    Parameters
+    ----------
+    axis : RelaxedAxis
+    error : TurningError
+    given_B : Vec3, N m
+        Torque that the believed rotors give now.
+    switching_B : Vec3, rad/s^2
+        Switching input of the law.
+    vehicle : Vehicle
+        As believed.
+    residual_speed : scalar, rad/s
+        Believed Omega of (4); of tilted rotors its vector.
+    parameters : RelaxedParameters
+
+    Returns
+    -------
+    memory : RelaxedMemory
+    torque_B : Vec3
+        In N m, body axes.
+    """
+    J, spin, to_B = vehicle.inertia, error.omega.z, axis.to_B
+    across = 0.5 * (J.x + J.y)
+    momentum = rotor_momentum(vehicle, residual_speed)
+    precession = (J.z * spin + (momentum.z if isinstance(momentum, Vec3) else momentum)) / across
+    weights = parameters.weights
+    problem = SpinProblem(spin, precession, mean_bandwidth(vehicle), weights.angle, weights.rate)
+    poles = improve(problem, axis.memory.poles)
+    gain = spin_gain(problem, poles)
+    # What keeps the error at zero: a wanted axis that moves in the world turns backwards in the body.
+    turning = Vec3(error.rate.x, error.rate.y, spin)
+    ahead = error.acceleration - Vec3(0.0, 0.0, spin).cross(error.rate)
+    balance_B = body_momentum(vehicle, to_B @ ahead) - torque_of_motion(vehicle, to_B @ turning, residual_speed)
+    # Of yaw nothing is lacking: what the air takes there is no error.
+    over = given_B - balance_B
+    turned = over_inertia(vehicle, Vec3(over.x, over.y, 0.0))
+    lacking = to_B.T @ Vec3(turned.x, turned.y, 0.0)
+    rate = error.omega - turning
+    fed_back = [
+        factor.times(Complex(state.x, state.y)) for factor, state in zip(gain, (error.e, rate, lacking), strict=True)
+    ]
+    u = Vec3(-sum(term.re for term in fed_back), -sum(term.im for term in fed_back), 0.0)
+    return axis.memory._replace(poles=poles), balance_B + body_momentum(vehicle, to_B @ u + switching_B)

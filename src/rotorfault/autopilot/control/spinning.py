@@ -1,0 +1,112 @@
+"""The cascade's attitude loop seen from the axis of relaxed hover: what it tracks, and the torque it asks for."""
+
+from __future__ import annotations
+
+from typing import final
+
+from rotorfault.autopilot.allocation.available import HOVER_RESERVE
+from rotorfault.autopilot.control.attitude import AttitudeReference, AttitudeTracking, Wanted
+from rotorfault.autopilot.control.protocol import ControlInputs
+from rotorfault.autopilot.control.relaxed import (
+    RelaxedMemory,
+    RelaxedParameters,
+    TurningError,
+    attainable,
+    relaxed_axis,
+    relaxed_torque,
+)
+from rotorfault.maths.geometry import Mat3, Vec3
+from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
+from rotorfault.model.signals import Wrench
+
+# Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
+LEAST_THRUST = 0.3
+# Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
+# rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
+FASTEST = 10.0
+
+
+@final
+class Spinning:
+    """One sampling instant of an attitude loop that may give yaw up.
+
+    Parameters
+    ----------
+    memory : RelaxedMemory
+    parameters : RelaxedParameters
+    inputs : ControlInputs
+    dt : scalar, s
+        Sampling period.
+    """
+
+    def __init__(
+        self, memory: RelaxedMemory, parameters: RelaxedParameters, inputs: ControlInputs, dt: Scalar
+    ) -> None:
+        self.inputs, self.parameters, self.dt = inputs, parameters, dt
+        estimate = inputs.estimate
+        self.axis = relaxed_axis(
+            memory,
+            inputs.vehicle,
+            inputs.diagnosis,
+            inputs.thrust_with_yaw,
+            estimate.omega_B,
+            inputs.residual_speed,
+            parameters,
+            dt,
+        )
+        self.omega = self.axis.to_B.T @ estimate.omega_B
+
+    @property
+    def available(self) -> Scalar:
+        """Largest thrust in N that position control should ask for: that in balance, level or about the axis."""
+        inputs = self.inputs
+        most = minimum(self.axis.thrust, HOVER_RESERVE * inputs.vehicle.mass * inputs.vehicle.gravity)
+        return maximum(inputs.thrust_available, most * self.axis.given_up)
+
+    def track(
+        self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
+    ) -> Wanted:
+        """What the law tracks, in body axes; of yaw so much as is held. See `AttitudeTracking.track`."""
+        axis, inputs = self.axis, self.inputs
+        self.cosine = R_WB.zz
+        seen = inputs.estimate._replace(q_WB=inputs.estimate.q_WB @ axis.turn, omega_B=self.omega)
+        turn = tracking.track(state, seen, R_WB @ axis.to_B, f_W, inputs.reference, bandwidth, self.dt)
+        fixed = turn.acceleration + self.omega.cross(turn.rate)
+        self._error = TurningError(
+            turn.e, self.omega, Vec3(turn.rate.x, turn.rate.y, 0.0), Vec3(fixed.x, fixed.y, 0.0)
+        )
+        held = 1.0 - axis.given_up
+
+        def in_body(v: Vec3, free: Scalar) -> Vec3:
+            return axis.to_B @ Vec3(v.x, v.y, v.z * held + free * axis.given_up)
+
+        return turn._replace(
+            e=in_body(turn.e, 0.0),
+            rate=in_body(turn.rate, self.omega.z),
+            acceleration=in_body(turn.acceleration, 0.0),
+        )
+
+    def steer(self, upright: Wrench, given_B: Vec3, switching_B: Vec3) -> tuple[RelaxedMemory, Wrench]:
+        """The memory of the next instant, and the wrench to ask for.
+
+        Parameters
+        ----------
+        upright : Wrench
+            Of the law that holds yaw.
+        given_B : Vec3, N m
+            Torque that the believed rotors give now.
+        switching_B : Vec3, rad/s^2
+            Switching input of the law.
+        """
+        inputs, given_up = self.inputs, self.axis.given_up
+        after, torque_B = relaxed_torque(
+            self.axis, self._error, given_B, switching_B, inputs.vehicle, inputs.residual_speed, self.parameters
+        )
+        # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
+        weight = inputs.vehicle.mass * inputs.vehicle.gravity
+        carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
+        relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
+        beyond = absolute(self.omega.z) / (FASTEST * inputs.vehicle.rotor_bandwidth)
+        given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
+        held = 1.0 - given_up
+        return after, Wrench(upright.thrust, upright.torque_B * held + relaxed_B * given_up)

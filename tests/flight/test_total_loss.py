@@ -1,0 +1,72 @@
+"""Flight goes on without one rotor, or two opposite ones: detected, believed and flown, in wind and gusts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gates import needs_simd
+
+import rotorfault as rf
+
+
+def number(value: float, unit: str) -> dict[str, object]:
+    return {"value": value, "unit": unit, "source": "of this test"}
+
+
+# Damping that is printed for the vehicle or one like it, without which a spin has no end.
+DAMPING: dict[str, tuple[str, dict[str, Any]]] = {
+    "mueller-2014": ("hummingbird", {"vehicle.air.damping_yaw": number(2.75e-3, "N m s")}),
+    "hummingbird": ("hummingbird", {"vehicle.air.rotor_drag": number(1.19e-4, "kg/rad")}),
+    "crazyflie-2.1": ("crazyflie", {"vehicle.air.rotor_drag": number(1.03e-6, "kg/rad")}),
+    "paper": ("quiet", {"vehicle.air.damping_yaw": number(5e-3, "N m s")}),
+}
+
+
+def lose(vehicle: str, dead: tuple[int, ...], **settings: object) -> dict[str, object]:
+    preset, damping = DAMPING[vehicle]
+    return {
+        "vehicle": vehicle,
+        **damping,
+        "controller": {"kind": "roismc", "preset": preset},
+        "duration": 8.0,
+        "start.position": [0.0, 0.0, 10.0],
+        "reference.position": [0.0, 0.0, 10.0],
+        "wind.velocity_W": [4.0, 0.0, 0.0],
+        "wind.wind_at_6m": 4.0,
+        "wind.altitude": 10.0,
+        "fault": [{"kind": "total", "rotor": rotor, "time": 1.0} for rotor in dead],
+        **settings,
+    }
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("vehicle", DAMPING)
+def test_it_flies_on(vehicle: str) -> None:
+    # Two rotors of the paper's vehicle carry just its weight.
+    for dead in ((1,), (4,), (1, 2)) if vehicle != "paper" else ((1,), (4,)):
+        found = rf.fly_many("hover-fault", {"seed": list(range(8))}, settings=lose(vehicle, dead)).table.to_pandas()
+        assert found["survived"].all(), (dead, found["outcome"].tolist())
+        assert found["position_error_end.z"].abs().max() < 2.0
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+def test_upright_it_does_not() -> None:
+    """The same flights with the axis left at body z: what relaxed hover is for."""
+    upright = lose("paper", (1,), **{"controller.cascade.yaw_lost": "upright"})
+    found = rf.fly_many("hover-fault", {"seed": list(range(8))}, settings=upright).table.to_pandas()
+    assert found["survived"].mean() < 0.5
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_yaw_that_is_held_is_held_to_the_last_bit() -> None:
+    """Relaxed hover changes nothing until yaw is given up."""
+    partial = {"vehicle": "hummingbird", "controller": {"kind": "roismc", "preset": "hummingbird"}, "duration": 2.0}
+    one, other = (
+        rf.fly("hover-fault", settings={**partial, "controller.cascade.yaw_lost": choice})
+        for choice in ("relaxed", "upright")
+    )
+    np.testing.assert_array_equal(one.data["position"], other.data["position"])
