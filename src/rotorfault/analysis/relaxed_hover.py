@@ -241,7 +241,9 @@ class _Problem:
         if not np.all(np.isfinite(x)):
             return None
         left = max(float(np.abs(self.unbalanced(x)).max()), -float((rest @ x).min()))
-        return x if left < _BALANCED else None
+        # At the bound of the search nothing balances the spin: it only turns too fast to see that.
+        settled = left < _BALANCED and max(np.abs(x[-3:])) * _RATE < 0.9 * max(fastest, _STANDING)
+        return x if settled else None
 
     def best(self, reserve: float) -> Array | None:
         """The motion with the least power that searches find, one at rest if there is any; None if there is none."""
