@@ -20,12 +20,15 @@ is claimed by US patent 9,856,016 B2. The equations here are solved as they stan
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
+from rotorfault.analysis.vehicle_settings import numbers_of_vehicle
+from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
 from rotorfault.base.text_table import table_lines
@@ -44,6 +47,7 @@ from rotorfault.model.vehicle import (
     rotor_speeds,
     wrench_of,
 )
+from rotorfault.model.vehicle_file import VehicleFile
 
 RESERVE = 0.3  # as the cascade of controllers has it
 GYRO_END = math.radians(2000.0)  # rad/s: end of the usual largest range of small gyros, such as the BMI088's
@@ -71,14 +75,15 @@ class RelaxedHover(NamedTuple):
         return record_line(self)
 
 
-def relaxed_hover(vehicle: Vehicle, dead: Sequence[int] = (), reserve: float = RESERVE) -> RelaxedHover:
+def relaxed_hover(
+    vehicle: Vehicle | VehicleFile | str | Path, dead: Iterable[int] = (), reserve: float = RESERVE
+) -> RelaxedHover:
     """The steady hover that a vehicle has left when rotors are dead, in still air.
 
     Parameters
     ----------
-    vehicle : Vehicle
-        Numbers, one flight's.
-    dead : sequence of int
+    vehicle : Vehicle, VehicleFile, or name or path of a vehicle file
+    dead : iterable of int
         Rotors that give no thrust, counted from 1.
     reserve : float
         Least share, 0 to 1, of their mean thrust that each living rotor keeps.
@@ -90,9 +95,12 @@ def relaxed_hover(vehicle: Vehicle, dead: Sequence[int] = (), reserve: float = R
     Raises
     ------
     InputError
-        If a rotor does not exist or is named twice, none lives, or the reserve is not between 0 and 1.
+        If there is no such vehicle, a rotor does not exist or is named twice, none lives, or the reserve is not
+        between 0 and 1.
     """
+    vehicle = numbers_of_vehicle(vehicle)
     gone = _dead(vehicle, dead)
+    require(reserve, (int, float), "reserve", "a share of the mean thrust, 0 to 1")
     if not 0.0 <= reserve <= 1.0:
         raise InputError(f"reserve: {reserve!r} came; allowed: a share of the mean thrust, 0 to 1")
     problem = _Problem(vehicle, gone)
@@ -124,14 +132,15 @@ def relaxed_lines(hover: RelaxedHover, vehicle: Vehicle) -> list[str]:
     if not hover.possible:
         return [f"Relaxed hover, {gone}: not possible; {hover.why}"]
     turning = math.isfinite(hover.period)
+    circle = f", on a circle of {hover.radius:.2g} m" if turning else ""
     # What the search leaves of a rate that is none is not printed.
     size = 1e-4 * float(hover.omega_B.norm())
     rates = ", ".join(f"{rate:.3g}" if abs(rate) > size else "0" for rate in map(float, hover.omega_B))
     rows = [
         ("thrusts [N]", ", ".join(f"{number}: {float(f):.4g}" for number, f in enumerate(hover.thrust, start=1))),
-        ("least thrust of a living rotor", f"{hover.reserve:.3g} of their mean"),
+        ("least thrust of a living rotor", f"{hover.reserve:.3g} of their mean" if hover.reserve > 1e-6 else "0"),
         ("body rates p, q, r [rad/s]", f"{rates}; a turn takes {hover.period:.3g} s" if turning else "0, it stands"),
-        ("tilt", f"{math.degrees(hover.tilt):.3g} deg, on a circle of {hover.radius:.2g} m" if turning else "0"),
+        ("tilt", f"{math.degrees(hover.tilt):.3g} deg{circle}"),
         ("power", f"{hover.power:.3g} times that of hover with all rotors"),
     ]
     note = []
@@ -140,10 +149,9 @@ def relaxed_lines(hover: RelaxedHover, vehicle: Vehicle) -> list[str]:
     return [f"Relaxed hover, {gone}", *table_lines(rows, "<<", indent=2), *note]
 
 
-def _dead(vehicle: Vehicle, dead: Sequence[int]) -> tuple[int, ...]:
-    for rotor in dead:
-        if not 1 <= rotor <= vehicle.rotors:
-            raise InputError(f"rotor {rotor} came; allowed: 1 to {vehicle.rotors}, the rotors of this vehicle")
+def _dead(vehicle: Vehicle, of: Iterable[int]) -> tuple[int, ...]:
+    require(of, Iterable, "dead", "numbers of rotors, such as [1, 3]")
+    dead = [whole_number(rotor, "dead rotor", 1, vehicle.rotors) for rotor in of]
     if len({*dead}) != len(dead):
         raise InputError(f"dead rotors {', '.join(map(str, dead))} came; allowed: each once")
     if len(dead) == vehicle.rotors:
@@ -185,10 +193,14 @@ class _Problem:
 
     def carried(self, thrust: PerRotor, omega: Vec3) -> Scalar:
         """Force of the rotors in N along the axis about which the body turns."""
-        up: Scalar = wrench_of(self.vehicle, thrust).thrust * upright(omega)
+        along = wrench_of(self.vehicle, thrust).thrust
+        up: Scalar = along * upright(omega)
         if self.vehicle.tilt == ():
             return up
         beside = lateral_force(self.vehicle, thrust)
+        if not np.any(np.abs(omega.z) > _STANDING):
+            # It stands, and leans until the whole force points up.
+            return sqrt(along * along + beside.x * beside.x + beside.y * beside.y)
         across = (beside.x * omega.x + beside.y * omega.y) * omega.z
         return up + across / ((omega.dot(omega) + TINY) * upright(omega))
 
@@ -273,7 +285,8 @@ class _Problem:
     def result(self, x: Array) -> RelaxedHover:
         """The motion in the vehicle's own numbers."""
         thrust, omega = self.split(x)
-        thrust = PerRotor.of(float(f) for f in thrust)
+        # What the search leaves of a thrust that is none.
+        thrust = PerRotor.of(float(f) if abs(f) > 1e-9 * self.mean else 0.0 for f in thrust)
         omega = Vec3.of(float(rate) for rate in omega)
         rate, up = float(omega.norm()), float(upright(omega))
         turning = rate > _STANDING
@@ -289,8 +302,8 @@ class _Problem:
             possible=True,
             thrust=thrust,
             omega_B=omega if turning else zeros(),
-            axis_B=omega / math.copysign(rate, omega.z) if turning else Vec3(0.0, 0.0, 1.0),
-            tilt=math.acos(min(1.0, up)) if turning else 0.0,
+            axis_B=omega / math.copysign(rate, omega.z) if turning else force_B / total,
+            tilt=math.acos(min(1.0, up if turning else float(force_B.z) / total)),
             period=2.0 * math.pi / rate if turning else math.inf,
             radius=lateral / float(self.vehicle.mass) / rate**2 if turning else 0.0,
             power=sum(max(f, 0.0) ** 1.5 for f in living) / sound,

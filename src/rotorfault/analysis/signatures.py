@@ -25,14 +25,17 @@ from __future__ import annotations
 
 import math
 from itertools import combinations
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import nnls
 from scipy.special import ndtri
 
+from rotorfault.analysis.vehicle_settings import numbers_of_vehicle
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger, LuenbergerSettings
 from rotorfault.autopilot.diagnosis.model_error import noise_energies
+from rotorfault.base.bounds import positive
 from rotorfault.base.one_line import record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
@@ -40,6 +43,7 @@ from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.vehicle import Vehicle, inertia_matrix
+from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.plant.sensors import Noisy
 
 TIME = 2.0  # s within which a rotor is to be named
@@ -94,13 +98,14 @@ def signature_angles(vehicle: Vehicle) -> Array:
     return np.asarray(np.arccos(np.clip(unit.T @ unit, -1.0, 1.0)))
 
 
-def told_apart(vehicle: Vehicle, period: float = 0.001, rate_noise: float | None = None) -> Signatures:
+def told_apart(
+    vehicle: Vehicle | VehicleFile | str | Path, period: float = 0.001, rate_noise: float | None = None
+) -> Signatures:
     """What single losses, and equal losses of two rotors, can be told apart in hover.
 
     Parameters
     ----------
-    vehicle : Vehicle
-        Of one set of numbers.
+    vehicle : Vehicle, VehicleFile, or name or path of a vehicle file
     period : float, s
         Of sampling.
     rate_noise : float, rad/s, optional
@@ -109,8 +114,16 @@ def told_apart(vehicle: Vehicle, period: float = 0.001, rate_noise: float | None
     Returns
     -------
     Signatures
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle, or the period or the noise is not above 0.
     """
-    sigma_rate = Noisy.Settings.model_validate({}).rate if rate_noise is None else rate_noise
+    vehicle = numbers_of_vehicle(vehicle)
+    period = positive(period, "period", "s", 0.1)
+    usual = Noisy.Settings.model_validate({}).rate
+    sigma_rate = usual if rate_noise is None else positive(rate_noise, "rate_noise", "rad/s")
     settings = LuenbergerSettings()
     gains = Luenberger(settings).parameters(Context(vehicle, period)).dynamics
     sigma = sigma_rate * math.sqrt(noise_energies(gains.gain_rate, gains.gain_deviation, period)[1])

@@ -1,4 +1,4 @@
-"""A vehicle with some of its numbers set otherwise, for questions that are asked before a flight."""
+"""The vehicle that a question before a flight is about, and one with some of its numbers set otherwise."""
 
 from __future__ import annotations
 
@@ -6,9 +6,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rotorfault.base.bounds import require
 from rotorfault.base.config import validate
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.scenario.overrides import override_all
+
+
+def numbers_of_vehicle(of: Vehicle | VehicleFile | str | Path) -> Vehicle:
+    """Numbers of a vehicle however it is given.
+
+    Parameters
+    ----------
+    of : Vehicle, VehicleFile, or name or path of a vehicle file
+
+    Raises
+    ------
+    InputError
+        If there is no such vehicle, or it is none of these.
+    """
+    require(of, (Vehicle, VehicleFile, str, Path), "vehicle", "a name, a path that ends in .toml, or a Vehicle")
+    if isinstance(of, Vehicle):
+        return of
+    file = load_vehicle(of) if isinstance(of, (str, Path)) else of
+    return file.vehicle
 
 
 def vehicle_with(vehicle: VehicleFile | str | Path, settings: Mapping[str, Any]) -> VehicleFile:

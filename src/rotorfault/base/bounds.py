@@ -121,7 +121,8 @@ def positive(value: object, name: str, unit: str, most: float = math.inf) -> flo
         found = math.nan
     if not (0.0 < found <= most and math.isfinite(found)):
         until = f", up to {most:g}" if math.isfinite(most) else ""
-        raise InputError(f"{name}: got {short(value)}; allowed: a number of {unit} above 0{until}")
+        number = "a number" if unit == "1" else f"a number of {unit}"
+        raise InputError(f"{name}: got {short(value)}; allowed: {number} above 0{until}")
     return found
 
 

@@ -161,6 +161,7 @@ def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
     else:
         message = re.sub(r"^(Input|String|Tuple|List) should", "must", message).replace("Value error, ", "")
         message = re.sub(r"a valid dictionary or instance of \w+", "a table", message)
+        message = message.replace("a valid tuple", "a list").replace("a valid list", "a list")
         message += f"; got {short(detail['input'])}"
     return keys, " ".join(message.split())
 

@@ -119,6 +119,8 @@ def trim(
     settings = parse_overrides(assignments or [])
     file = load_vehicle(vehicle)
     if dead:
+        if losses or preset is not None or controller != "roismc":
+            raise InputError("--dead goes without --loss, --controller and --preset: relaxed hover has neither")
         from rotorfault.analysis.relaxed_hover import relaxed_hover, relaxed_lines
         from rotorfault.analysis.vehicle_settings import vehicle_with
 

@@ -17,13 +17,17 @@ the tilt torque in *arm axes*, about the normals of the two arms, in newton.
 
 from __future__ import annotations
 
+from operator import mul
 from typing import NamedTuple
 
-from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar
+from rotorfault.maths.geometry import PerRotor, spread
+from rotorfault.maths.scalar import Scalar, both, clip, greater, less
 from rotorfault.model.effectiveness import WrenchRows, effectiveness, lateral_rows, pseudo_inverse
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import Opposite, Vehicle
+
+SHARINGS = 4  # rounds in which hover is shared out anew: a rotor that comes to its limit takes one
+OWN = 1e-9  # of an axis, squared: with less of its own it is out of reach of the rotors that are left
 
 
 class PairDemand(NamedTuple):
@@ -116,12 +120,29 @@ def nominal_inverse(vehicle: Vehicle, wrench: Wrench) -> PerRotor:
 
 
 def hover_thrust(vehicle: Vehicle) -> PerRotor:
-    """Thrust per rotor in level hover with sound rotors, in N."""
+    """Thrust per rotor in level hover with sound rotors, in N.
+
+    Where rotors have limits of their own, what one of them cannot give is shared out among the others, as far as they
+    can give it.
+    """
     weight = vehicle.mass * vehicle.gravity
     if vehicle.pairs != ():
         return PerRotor.all(weight / 4.0)
     thrust: PerRotor = _inverse(vehicle).thrust * weight
-    return thrust
+    limits = (vehicle.thrust_min, vehicle.thrust_max, vehicle.rotor_gain)
+    if not any(isinstance(limit, PerRotor) for limit in limits):
+        return thrust
+    low, high, gain = (spread(limit, vehicle.rotors) for limit in limits)
+    low, high = low.map(mul, gain), high.map(mul, gain)
+    rows, lateral = effectiveness(vehicle), lateral_rows(vehicle)
+    for _ in range(SHARINGS):
+        within = thrust.map(clip, low, high)
+        free = thrust.map(lambda f, lowest, most: both(greater(f, lowest), less(f, most)), low, high)
+        left = WrenchRows(*(row.map(mul, free) for row in rows))
+        given = rows.wrench(within)
+        lack = Wrench(weight - given.thrust, -given.torque_B)
+        thrust = within + pseudo_inverse(left, lateral, OWN).times(lack).map(mul, free)
+    return thrust.map(clip, low, high)
 
 
 def _inverse(vehicle: Vehicle) -> WrenchRows:

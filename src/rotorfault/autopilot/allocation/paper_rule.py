@@ -72,7 +72,7 @@ class PaperRule(Allocator[Nothing, PaperRuleParameters]):
         if context.vehicle.pairs == ():
             raise InputError(
                 "allocation: paper_rule is for quadrotors whose rotors are opposite in pairs, as (41)-(44) are; "
-                "allowed for this vehicle: effectiveness, nominal"
+                "allowed for this vehicle: effectiveness, sequential, nominal"
             )
         return PaperRuleParameters(self.settings.fallback.effectiveness_min)
 

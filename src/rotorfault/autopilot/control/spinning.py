@@ -17,6 +17,7 @@ from rotorfault.autopilot.control.relaxed import (
 )
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
+from rotorfault.model.motion import mean_bandwidth
 from rotorfault.model.signals import Wrench
 
 # Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
@@ -106,7 +107,7 @@ class Spinning:
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
         relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
-        beyond = absolute(self.omega.z) / (FASTEST * inputs.vehicle.rotor_bandwidth)
+        beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(inputs.vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         held = 1.0 - given_up
         return after, Wrench(upright.thrust, upright.torque_B * held + relaxed_B * given_up)
