@@ -50,6 +50,7 @@ def many(count: int, **tables: Any) -> Batch:
         sensors="noisy",
         duration=0.005 * (2 * CHUNK + 100),
         diagnosis="off",
+        plant="paper_model",
         **tables,
     ).as_tables()
     return assemble_all(

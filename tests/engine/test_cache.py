@@ -282,11 +282,12 @@ def test_an_edited_class_is_not_taken_for_what_it_was() -> None:
 def test_structure_is_one_word_per_part() -> None:
     """In the order of the slots; of several in one slot each, and besides them the reference and the steps."""
     faults = [{"kind": "total", "rotor": rotor, "time": 0.1} for rotor in (2, 4)]
-    *parts, _, substeps, floats = structure(assemble(short(fault=faults)).loop)
+    *parts, _, substeps, supply, floats = structure(assemble(short(fault=faults)).loop)
     slots = [word.partition(":")[0] for word in parts]
     truth, belief = ["wind", "fault", "fault", "plant", "sensors"], ["estimator", "diagnosis", "on_fault"]
     assert slots == [*truth, *belief, "controller", "allocation"]
     assert "RigidBody" in parts[slots.index("plant")]
+    assert supply == "battery False, compensated False"
     assert (substeps, floats) == ("1 substeps, 4 rotors", "()"), (
         "all parts are the package's own, whose floats are numbers"
     )

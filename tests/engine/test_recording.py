@@ -87,7 +87,9 @@ def test_a_lost_flight_is_data(engine: str) -> None:
 def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The last record of a flight is the first one from its end on, whenever the engine notices the end."""
     falling = [
-        short(duration=1.25, record_period=0.035, sensors="ideal", diagnosis="off", fault=[fault])
+        short(
+            duration=1.25, record_period=0.035, sensors="ideal", diagnosis="off", fault=[fault], plant="paper_model"
+        )
         for fault in (
             {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0},
             {"kind": "step", "rotor": 2, "time": 0.25, "loss": 1.0},
@@ -114,7 +116,9 @@ def test_records_end_with_the_flight_and_not_with_the_chunk(engine: str, monkeyp
 def test_an_end_between_two_records_far_apart_is_recorded(engine: str) -> None:
     """The engine flies on until the record, though nothing else is left to fly for."""
     fault = {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0}
-    batch = assemble(short(duration=0.005 * 3 * CHUNK, record_period=0.005 * (CHUNK + 3), fault=[fault]))
+    batch = assemble(
+        short(duration=0.005 * 3 * CHUNK, record_period=0.005 * (CHUNK + 3), fault=[fault], plant="paper_model")
+    )
     found = run(batch, engine)
     assert 0 < found.state[leaf_names(batch.state).index("scores.end"), 0] < CHUNK
     assert found.steps.tolist() == [0.0, CHUNK + 3.0]

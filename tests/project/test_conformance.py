@@ -191,6 +191,10 @@ MISMATCHES: list[dict[str, Any]] = [
     {"rotor_gain": 1.01},
     {"linear_drag": 1.01},
     {"thrust_curve": 0.21},
+    {"thrust_max": 0.6},
+    {"thrust_coefficient": 1.1},
+    {"torque_ratio": 1.01},
+    {"centre_of_mass": [0.001, 0.0, 0.0]},
 ]
 
 

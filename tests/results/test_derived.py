@@ -16,6 +16,7 @@ from rotorfault.results.events import events
 GIVES = 1.2  # N
 STUCK = {
     "vehicle": "hummingbird", "controller.preset": "hummingbird", "duration": 2.5,
+    "controller.cascade.yaw_lost": "upright",
     "fault": [{"kind": "stuck", "rotor": 1, "time": 1.0, "thrust": GIVES}],
 }  # fmt: skip
 

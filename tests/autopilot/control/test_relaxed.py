@@ -11,7 +11,6 @@ from rotorfault.analysis.relaxed_hover import relaxed_hover
 from rotorfault.autopilot.control.relaxed import (
     RelaxedAxis,
     RelaxedParameters,
-    RelaxedSettings,
     SpinWeights,
     TurningError,
     at_rest,
@@ -50,7 +49,7 @@ def axis_of(
 @pytest.mark.parametrize("dead", [1, 2, 3, 4])
 def test_the_axis_is_that_of_relaxed_hover_with_those_thrusts(dead: int) -> None:
     vehicle = mueller()
-    parameters = relaxed_parameters(RelaxedSettings(reserve=0.3, lean=1.2, time=0.1), WEIGHTS)
+    parameters = relaxed_parameters(0.3, 1.2, 0.1, WEIGHTS)
     hover = relaxed_hover(vehicle, [dead])
     speeds = rotor_speeds(vehicle, hover.thrust)
     axis = axis_of(vehicle, dead, hover.omega_B, float(residual_speed(vehicle, speeds)), parameters)
@@ -67,7 +66,7 @@ def test_the_axis_is_that_of_relaxed_hover_with_those_thrusts(dead: int) -> None
 def test_in_balance_nothing_but_the_balance_is_asked_for() -> None:
     vehicle = mueller()
     hover = relaxed_hover(vehicle, [1])
-    parameters = relaxed_parameters(RelaxedSettings(lean=1.2), WEIGHTS)
+    parameters = relaxed_parameters(0.3, 1.2, 0.5, WEIGHTS)
     residual = float(residual_speed(vehicle, rotor_speeds(vehicle, hover.thrust)))
     axis = axis_of(vehicle, 1, hover.omega_B, residual, parameters)
     # The axis put exactly where hover has it.
@@ -85,7 +84,7 @@ def test_in_balance_nothing_but_the_balance_is_asked_for() -> None:
 
 def test_with_yaw_in_balance_nothing_is_given_up() -> None:
     vehicle = mueller()
-    parameters = relaxed_parameters(RelaxedSettings(), WEIGHTS)
+    parameters = relaxed_parameters(0.3, 0.35, 0.5, WEIGHTS)
     weight = float(vehicle.mass * vehicle.gravity)
     for with_yaw, given_up in ((2.0 * weight, 0.0), (weight, 0.0), (0.975 * weight, 0.5), (0.0, 1.0)):
         axis = relaxed_axis(
@@ -98,7 +97,7 @@ def test_with_yaw_in_balance_nothing_is_given_up() -> None:
 
 def test_the_axis_stays_within_its_limit_and_is_finite_at_rest() -> None:
     vehicle = mueller()
-    parameters = relaxed_parameters(RelaxedSettings(reserve=1.0, lean=0.2), WEIGHTS)
+    parameters = relaxed_parameters(1.0, 0.2, 0.5, WEIGHTS)
     for spin in (0.0, 1e-9, 0.5, 3.0, -3.0):
         axis = axis_of(vehicle, 1, Vec3(0.0, 0.0, spin), 0.0, parameters, steps=3000)
         lean = math.hypot(axis.memory.lean.x, axis.memory.lean.y)

@@ -42,7 +42,7 @@ from rotorfault.autopilot.control.protocol import (
 from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
     RelaxedParameters,
-    RelaxedSettings,
+    SpinWeights,
     at_rest,
     relaxed_parameters,
 )
@@ -99,7 +99,17 @@ class CascadeSettings(Strict):
         description="where yaw cannot be held: relaxed: spins about an axis that leaves its rotors room | upright: "
         "about body z; laws without weights, and `euler`, are always upright",
     )
-    relaxed: RelaxedSettings = Field(default=RelaxedSettings(), description=RelaxedSettings.__doc__)
+    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust.
+    relaxed_reserve: float = Field(
+        default=0.3, ge=0.0, le=1.0, description="relaxed: least thrust of a living rotor, as a share of equal ones"
+    )
+    # 20 degrees: costs 6 % of lift.
+    relaxed_lean: float = Field(
+        default=0.35, gt=0.0, lt=1.5, description="relaxed: largest angle of the axis to body z [rad]"
+    )
+    relaxed_time: float = Field(
+        default=0.5, gt=0.0, description="relaxed: time constant with which the axis moves [s]"
+    )
     six_inputs: bool = Field(default=False, description="x and y accelerations act directly: unphysical, for study")
 
 
@@ -113,7 +123,7 @@ class CascadeParameters(NamedTuple):
     cos_min: Scalar
     filter_bandwidth: Scalar  # rad/s
     horizontal_lag: Scalar  # rad/s
-    relaxed: RelaxedParameters | tuple[()]  # empty where it stays upright
+    relaxed: RelaxedParameters
 
 
 class CascadeMemory(NamedTuple):
@@ -173,7 +183,6 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         s = self.settings
         law = self.law.parameters(context)
         weights = self.law.spin_weights(law)
-        relaxes = s.yaw_lost == "relaxed" and s.tracking == "so3" and not s.six_inputs
         return CascadeParameters(
             law,
             math.tan(s.tilt_max),
@@ -182,7 +191,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             s.cos_min,
             s.filter_bandwidth,
             s.horizontal_lag,
-            relaxed_parameters(s.relaxed, weights) if relaxes and weights is not None else (),
+            relaxed_parameters(s.relaxed_reserve, s.relaxed_lean, s.relaxed_time, weights or SpinWeights(0.0, 0.0)),
         )
 
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
@@ -195,12 +204,14 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         # Only its rate matters: surfaces begin there.
         attitude = _attitude_error(level, estimate.omega_B, level, level, nothing, Mat3.diagonal(level), level)
         law = self.law.initial(position, attitude, parameters.law)
-        relaxed = parameters.relaxed
+        s = self.settings
+        relaxes = s.yaw_lost == "relaxed" and s.tracking == "so3" and not s.six_inputs
+        relaxes = relaxes and self.law.spin_weights(parameters.law) is not None
         return CascadeMemory(
             law.position,
             law.attitude,
             start,
-            () if relaxed == () else at_rest(cast("RelaxedParameters", relaxed), inputs.vehicle),
+            at_rest(parameters.relaxed, inputs.vehicle) if relaxes else (),
         )
 
     def step(
@@ -215,8 +226,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         spinning = None
         available = inputs.thrust_available
         if memory.relaxed != ():
-            relaxed = cast("RelaxedMemory", memory.relaxed), cast("RelaxedParameters", parameters.relaxed)
-            spinning = Spinning(*relaxed, inputs, dt)
+            spinning = Spinning(cast("RelaxedMemory", memory.relaxed), parameters.relaxed, inputs, dt)
             available = spinning.available
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag

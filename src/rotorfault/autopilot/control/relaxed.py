@@ -11,9 +11,9 @@ yaw rate r that axis follows from the torque that is wanted in balance, without 
 
 with d the damping of roll and pitch, and tau the tilt torque of the thrusts wanted in balance: between those without
 any tilt torque, which may be below zero, and those of all believed rotors at the same share of what they can give,
-the first at which each living rotor keeps a `reserve`. Products of inertia and tilted rotors add to tau and d what
-is linear in p and q. r is the measured yaw rate: it finds its own balance between
-the rotors' drag torque and the air.
+the first at which each living rotor keeps a reserve (`relaxed_reserve`). Products of inertia and tilted rotors add to
+tau and d what is linear in p and q. r is the measured yaw rate: it finds its own balance between the rotors' drag
+torque and the air.
 
 **The law.** Error, rates and torque are seen in a frame whose z axis is n, roll and pitch of it as one complex
 number. Its gains solve the Riccati equation of `rotorfault.autopilot.control.spin_riccati`, whose states are error,
@@ -23,15 +23,13 @@ input of the sliding surface is added as elsewhere.
 
 **When.** How much of yaw is given up goes from 0 to 1 as the thrust that believed rotors have with yaw in balance
 falls from the weight to `YAW_LOST` of it. The torque is shared between the law that holds yaw and this one in that
-ratio, and the axis moves from z to n with the time constant `time`, so nothing jumps.
+ratio, and the axis moves from z to n with the time constant `relaxed_time`, so nothing jumps.
 """
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
-
-from pydantic import Field
 
 from rotorfault.autopilot.control.spin_riccati import (
     Complex,
@@ -41,7 +39,6 @@ from rotorfault.autopilot.control.spin_riccati import (
     optimal,
     spin_gain,
 )
-from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, clip, greater, maximum, minimum, select, sqrt
@@ -55,18 +52,6 @@ YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that hold
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 RIDGE = 1e-6  # relative
 MOST = 10.0  # of the weight: more thrust than is ever asked for
-
-
-class RelaxedSettings(Strict):
-    """How it hovers where yaw cannot be held."""
-
-    # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust.
-    reserve: float = Field(
-        default=0.3, ge=0.0, le=1.0, description="least thrust of a living rotor, as a share of equal ones"
-    )
-    # 20 degrees: costs 6 % of lift.
-    lean: float = Field(default=0.35, gt=0.0, lt=1.5, description="largest angle of the axis to body z [rad]")
-    time: float = Field(default=0.5, gt=0.0, description="time constant with which the axis moves [s]")
 
 
 class SpinWeights(NamedTuple):
@@ -111,9 +96,20 @@ class TurningError(NamedTuple):
     acceleration: Vec3  # rad/s^2: derivative of the wanted rate, as seen from the world
 
 
-def relaxed_parameters(settings: RelaxedSettings, weights: SpinWeights) -> RelaxedParameters:
-    """Numbers of the settings as a record."""
-    return RelaxedParameters(settings.reserve, math.tan(settings.lean), settings.time, weights)
+def relaxed_parameters(reserve: float, lean: float, time: float, weights: SpinWeights) -> RelaxedParameters:
+    """Numbers of relaxed hover as a record.
+
+    Parameters
+    ----------
+    reserve : float
+        Least thrust of a living rotor, as a share of equal ones.
+    lean : float, rad
+        Largest angle of the axis to body z.
+    time : float, s
+        Time constant with which the axis moves.
+    weights : SpinWeights
+    """
+    return RelaxedParameters(reserve, math.tan(lean), time, weights)
 
 
 def at_rest(parameters: RelaxedParameters, vehicle: Vehicle) -> RelaxedMemory:
