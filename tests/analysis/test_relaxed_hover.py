@@ -109,7 +109,7 @@ def test_what_is_not_possible_says_why() -> None:
 @pytest.mark.parametrize(
     ("dead", "reserve", "told"),
     [
-        ([5], 0.5, "rotor 5 came; allowed: 1 to 4"),
+        ([5], 0.5, "dead rotor: got 5; allowed: a whole number from 1 to 4"),
         ([1, 1], 0.5, "allowed: each once"),
         ([1, 2, 3, 4], 0.5, "at least one that lives"),
         ([1], 1.5, "reserve: 1.5 came"),

@@ -78,7 +78,7 @@ def test_parts_are_had_by_slot_and_by_name() -> None:
         ({"mismatch": {"mass": 0.0}}, r"mismatch\.mass: must be greater than 0; got 0\.0"),
         ({"vehicle": "papr"}, "vehicle: unknown vehicle 'papr'; did you mean 'paper'"),
         ({"vehicle": 3}, "vehicle: got 3; allowed: name of a vehicle"),
-        ({"fault": STEP}, "fault: must be a valid"),
+        ({"fault": STEP}, "fault: must be a list"),
         (
             {"fault": [STEP, {**STEP, "rotor": 5}]},
             r"fault 2: rotor: got 5; allowed: 1 to 4, the rotors of 'paper' \(key fault\.1\.rotor\)",
