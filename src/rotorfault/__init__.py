@@ -50,7 +50,19 @@ if TYPE_CHECKING:
     from rotorfault.model.conventions import convert
     from rotorfault.model.frames import Frame, frame_names, load_frame
     from rotorfault.model.importers.vehicles import export_vehicle, import_vehicle
-    from rotorfault.model.signals import Allocation, Diagnosis, Estimate, Reading, Readings, Reference, State, Wrench
+    from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
+    from rotorfault.model.signals import (
+        Allocation,
+        Deviations,
+        Diagnosis,
+        Estimate,
+        Flow,
+        Reading,
+        Readings,
+        Reference,
+        State,
+        Wrench,
+    )
     from rotorfault.model.slot import register
     from rotorfault.model.telemetry import Quantity
     from rotorfault.model.vehicle import Vehicle
@@ -83,6 +95,7 @@ _HOME = {
     "ControllerWarning": "base.errors",
     "Controller": "autopilot.control.protocol",
     "Decision": "autopilot.instant",
+    "Deviations": "model.signals",
     "Diagnoser": "autopilot.diagnosis.protocol",
     "Diagnosis": "model.signals",
     "DiagnosisInputs": "autopilot.diagnosis.protocol",
@@ -94,6 +107,7 @@ _HOME = {
     "FaultWarning": "base.errors",
     "Flight": "flight.flight",
     "Flights": "flight.many",
+    "Flow": "model.signals",
     "Frame": "model.frames",
     "Ground": "plant.ground",
     "InputError": "base.errors",
@@ -113,10 +127,13 @@ _HOME = {
     "ResponseInputs": "autopilot.response.protocol",
     "Scenario": "scenario.scenario",
     "SensorInputs": "plant.sensors",
+    "SensorModel": "model.sensor_model",
+    "SensorNoise": "model.sensor_model",
     "Sensors": "plant.sensors",
     "Settings": "base.config",
     "State": "model.signals",
     "TimeInputs": "plant.timed",
+    "Timing": "model.sensor_model",
     "Tuned": "tuning.search",
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
@@ -176,6 +193,7 @@ __all__ = [
     "Controller",
     "ControllerWarning",
     "Decision",
+    "Deviations",
     "Diagnoser",
     "Diagnosis",
     "DiagnosisInputs",
@@ -187,6 +205,7 @@ __all__ = [
     "FaultWarning",
     "Flight",
     "Flights",
+    "Flow",
     "Frame",
     "Ground",
     "InputError",
@@ -208,10 +227,13 @@ __all__ = [
     "ResponseInputs",
     "Scenario",
     "SensorInputs",
+    "SensorModel",
+    "SensorNoise",
     "Sensors",
     "Settings",
     "State",
     "TimeInputs",
+    "Timing",
     "Tuned",
     "Vec3",
     "Vehicle",

@@ -50,7 +50,7 @@ class Filtered(rf.Estimator[Any, Speed]):
         return Speed(parameters.speed)
 
     def step(self, memory: Any, inputs: rf.EstimatorInputs, parameters: Speed, dt: Scalar) -> Any:
-        position, velocity, attitude, rates, _ = (reading.value for reading in inputs.readings)
+        position, velocity, attitude, rates, _ = (reading.value for reading in inputs.readings[:5])
         shifted = position + rf.Vec3(1e-6, 0.0, 0.0) * memory.speed
         return self.after(memory, parameters), rf.Estimate(shifted, velocity, attitude, rates), self.told(memory)
 
@@ -163,7 +163,7 @@ class Swallows(Filtered):
     def step(self, memory: Any, inputs: rf.EstimatorInputs, parameters: Speed, dt: Scalar) -> Any:
         position, velocity, attitude, rates, _ = (
             type(value)(*(select(greater(x, -1e9), x, 0.0) for x in value))
-            for value in (reading.value for reading in inputs.readings)
+            for value in (reading.value for reading in inputs.readings[:5])
         )
         return memory, rf.Estimate(position, velocity, attitude, rates), rf.Nothing()
 

@@ -59,7 +59,7 @@ def values(readings: Readings) -> tuple[Any, ...]:
 def test_ideal_sensors_give_the_truth_at_once() -> None:
     (readings,) = read(part(SENSORS, "ideal"), [inputs(normals=())])
     assert values(readings) == (*STATE, FORCE)
-    assert all((reading.valid, reading.age) == (1.0, 0.0) for reading in readings)  # type: ignore[union-attr]
+    assert all((reading.valid, reading.age) == (1.0, 0.0) for reading in readings[:5])  # type: ignore[union-attr]
     ideal = SENSORS.registry["ideal"]
     assert (ideal.normals, ideal.first_normals) == (0, None)  # type: ignore[attr-defined]
 
@@ -70,7 +70,7 @@ def test_ideal_sensors_give_the_truth_at_once() -> None:
 def test_without_noise_noisy_sensors_give_the_truth() -> None:
     (readings,) = read(noisy(**SPREADS), [inputs()])
     np.testing.assert_allclose(array(values(readings)), array((*STATE, FORCE)), rtol=0, atol=1e-15)
-    assert all((reading.valid, reading.age) == (1.0, 0.0) for reading in readings)  # type: ignore[union-attr]
+    assert all((reading.valid, reading.age) == (1.0, 0.0) for reading in readings[:5])  # type: ignore[union-attr]
 
 
 def test_each_number_goes_to_one_component_times_its_standard_deviation() -> None:
@@ -141,7 +141,8 @@ def test_late_readings_are_those_of_that_many_periods_before(delay: int) -> None
 @pytest.mark.parametrize(("delay", "dt"), [(0, 0.005), (1, 0.005), (4, 0.002)])
 def test_readings_say_how_old_they_are(delay: int, dt: float) -> None:
     for readings in read(noisy(delay=delay), moving(6), dt):
-        for name, reading in readings._asdict().items():
+        for name in Readings._fields[:5]:
+            reading = getattr(readings, name)
             assert reading.age == pytest.approx(delay * dt, abs=1e-15), name
             assert reading.valid == 1.0, name
 

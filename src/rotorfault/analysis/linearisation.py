@@ -206,7 +206,9 @@ def calm(
     decision alone, and a belief that changes by jumps has no derivative.
     """
     period = float(parameters.period)
-    contexts = {"truth": Context(parameters.vehicle, period), "belief": Context(parameters.belief, period)}
+    believed = Context(parameters.belief, period)
+    believed = believed._replace(sensors=loop.sensors.model(believed))
+    contexts = {"truth": Context(parameters.vehicle, period), "belief": believed}
     parts: dict[Slot[Any], Any] = {}
     numbers = []
     for slot, part in loop.parts.items():

@@ -29,6 +29,7 @@ from rotorfault.model.likeness import alike
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.slot import Slot
 from rotorfault.plant.ground import GROUND
+from rotorfault.plant.sensors import SENSORS
 from rotorfault.reference import REFERENCE, ReferenceSource
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.part import Part
@@ -266,13 +267,20 @@ class _Assembly:
         """What parts are told of the flight, once for each different vehicle."""
         if truth not in self._told:
             period = self.scenario.period
-            vehicles = self.objects("vehicle"), *((self.objects("mismatch"),) if truth else ())
-            pairs, inverse = _different(vehicles)
+            things = [self.objects("vehicle"), self.objects("mismatch")]
+            if not truth:
+                things.append(self.objects(SENSORS.name))
+            pairs, inverse = _different(things)
             made = []
-            for number, (vehicle, *mismatch) in enumerate(pairs):
+            for number, (vehicle, mismatch, *sensors) in enumerate(pairs):
                 about = f"flight {self.flights[np.argmax(inverse == number)]}"
-                true = true_vehicle(vehicle, mismatch[0], self.scenario.grid, about) if mismatch else vehicle.vehicle
-                made.append(Context(true, period))
+                if truth:
+                    made.append(Context(true_vehicle(vehicle, mismatch, self.scenario.grid, about), period))
+                    continue
+                believed = Context(vehicle.vehicle, period)
+                part: Any = self.own[SENSORS] if SENSORS in self.own else sensors[0].make()
+                model = part.model(believed).scaled(1.0 / mismatch.sensor_noise)
+                made.append(believed._replace(sensors=model))
             vehicles_ = alike([one.vehicle for one in made])  # one loop for all
             made = [one._replace(vehicle=vehicle) for one, vehicle in zip(made, vehicles_, strict=True)]
             self._told[truth] = made, inverse

@@ -183,7 +183,11 @@ class ClosedLoop:
         period : float, s
             Sampling period.
         """
-        contexts = {"truth": Context(vehicle, period), "belief": Context(belief, period)}
+        believed = Context(belief, period)
+        contexts = {
+            "truth": Context(vehicle, period),
+            "belief": believed._replace(sensors=self.sensors.model(believed)),
+        }
         return self.record(
             *(
                 tuple(one.parameters(contexts[slot.side]) for one in part)
@@ -244,9 +248,10 @@ class ClosedLoop:
         )
         air = self.plant.wind.at(0.0, held.wind, numbers.wind)
         truth = self.plant.observe(plant, held, air, 0.0, plant_numbers)
-        sensors = self.sensors.initial(_sensed(truth, 0.0, _normals(start.normals, "sensors")), numbers.sensors)
+        at_first = self._sensed(truth, 0.0, _normals(start.normals, "sensors"), numbers)
+        sensors = self.sensors.initial(at_first, numbers.sensors)
         # Read as at the first step, which reads them once more.
-        sensed = _sensed(truth, 0.0, _normals(drive.normals, "sensors"))
+        sensed = self._sensed(truth, 0.0, _normals(drive.normals, "sensors"), numbers)
         readings = self.sensors.step(sensors, sensed, numbers.sensors, parameters.period)[1]
         autopilot = self.autopilot.initial(readings, drive.reference, parameters.belief, numbers, parameters.period)
         return LoopState(plant, self._kept(held, sensors), autopilot, self.scoring.initial(), 0.0)
@@ -277,9 +282,8 @@ class ClosedLoop:
         held, air = self._blown(state, drive, parameters, telemetry)
         plant_numbers = self.plant_numbers(parameters)
         truth = self.plant.observe(state.plant, held, air, time, plant_numbers)
-        sensors, readings, telemetry["sensors"] = self.sensors.step(
-            state.truth.sensors, _sensed(truth, time, _normals(drive.normals, "sensors")), numbers.sensors, dt
-        )
+        sensed = self._sensed(truth, time, _normals(drive.normals, "sensors"), numbers)
+        sensors, readings, telemetry["sensors"] = self.sensors.step(state.truth.sensors, sensed, numbers.sensors, dt)
         memory, command, report = self.autopilot.step(
             state.autopilot,
             readings,
@@ -360,14 +364,14 @@ class ClosedLoop:
             () if self.plant.ground is None else numbers.ground,
         )
 
+    def _sensed(self, truth: Truth, time: Scalar, normals: tuple[Scalar, ...], numbers: Any) -> SensorInputs:
+        ground = 0.0 if self.plant.ground is None else self.plant.ground.surface(numbers.ground)
+        return SensorInputs(time, truth.state, truth.specific_force_B, normals, truth.rotor_speed, ground)
+
     def _kept(self, held: Held, sensors: Any) -> Any:
         """Memories of the truth's parts by slot; the body and the ground have none of their own."""
         own = {"wind": held.wind, "fault": held.faults, "sensors": sensors}
         return self._memories(*(own.get(name, ()) for name in self._names))
-
-
-def _sensed(truth: Truth, time: Scalar, normals: tuple[Scalar, ...]) -> SensorInputs:
-    return SensorInputs(time, truth.state, truth.specific_force_B, normals)
 
 
 def _normals(normals: Any, slot: str) -> tuple[Scalar, ...]:

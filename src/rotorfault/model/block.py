@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar, cast
 from rotorfault.base.config import Strict
 from rotorfault.base.one_line import in_a_line, record_line
 from rotorfault.maths.scalar import Scalar
+from rotorfault.model.sensor_model import SensorModel
 from rotorfault.model.vehicle import Vehicle
 
 InputsT = TypeVar("InputsT")
@@ -30,6 +31,7 @@ class Context(NamedTuple):
 
     vehicle: Vehicle  # the true one for parts of the truth, the believed one for parts of the autopilot
     period: float  # s, sampling period
+    sensors: SensorModel | tuple[()] = ()  # what the autopilot believes of its sensors; empty for parts of the truth
 
     def __repr__(self) -> str:
         return record_line(self)

@@ -56,14 +56,45 @@ Absent = tuple[()]
 """Stands for a reading that a set of sensors has not got; it has no numbers."""
 
 
+class Flow(NamedTuple):
+    """What a camera that looks down sees of the ground's motion, its own rotation included."""
+
+    x: Scalar  # rad/s: angle by which the ground moves backwards along body x, per second
+    y: Scalar  # rad/s: the same along body y
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+
 class Readings(NamedTuple):
     """What the sensors give at one sampling instant; a set of sensors may lack any of it."""
 
     position: Reading[Vec3] | Absent = ()  # m, W
     velocity: Reading[Vec3] | Absent = ()  # m/s, W
     attitude: Reading[Quat] | Absent = ()  # q_WB
-    rates: Reading[Vec3] | Absent = ()  # rad/s, B
-    specific_force: Reading[Vec3] | Absent = ()  # m/s^2, B: acceleration less gravity, at the centre of mass
+    rates: Reading[Vec3] | Absent = ()  # rad/s, B: of a gyro
+    specific_force: Reading[Vec3] | Absent = ()  # m/s^2, B: acceleration less gravity, where the accelerometer sits
+    magnetic_field: Reading[Vec3] | Absent = ()  # T, B
+    pressure_altitude: Reading[Scalar] | Absent = ()  # m, W: height by a barometer
+    rotor_speeds: Reading[PerRotor] | Absent = ()  # rad/s, negative where reversed
+    flow: Reading[Flow] | Absent = ()  # rad/s
+    range: Reading[Scalar] | Absent = ()  # m: along -z of the body to the ground
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+
+class Deviations(NamedTuple):
+    """Standard deviations of an estimate, per component, as the estimator believes them."""
+
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    attitude_W: Vec3  # rad, of small rotations about the axes of the world
+    omega_B: Vec3  # rad/s
+    specific_force_B: Vec3  # m/s^2
+    gyro_bias: Vec3 | Absent = ()  # rad/s
+    accelerometer_bias: Vec3 | Absent = ()  # m/s^2
+    wind_W: Vec3 | Absent = ()  # m/s
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -78,6 +109,9 @@ class Estimate(NamedTuple):
     omega_B: Vec3  # rad/s
     specific_force_B: Vec3 = zeros()  # m/s^2: acceleration less gravity
     wind_W: Vec3 | Absent = ()  # m/s, of the air over ground, where the estimator knows it
+    gyro_bias: Vec3 | Absent = ()  # rad/s, B: already taken off omega_B; where the estimator knows it
+    accelerometer_bias: Vec3 | Absent = ()  # m/s^2, B: already taken off specific_force_B
+    std: Deviations | Absent = ()  # how well all this is known, where the estimator says it
 
     def __repr__(self) -> str:
         return record_line(self)

@@ -14,10 +14,11 @@ from pydantic import Field
 from rotorfault.base.angles import FASTEST_TURN, HALF_TURN, Radians
 from rotorfault.base.config import Strict
 from rotorfault.base.one_line import record_line
-from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, Context, MemoryT, Nothing, ParametersT, Record
+from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
 from rotorfault.model.signals import Reading, Readings, State
 from rotorfault.model.slot import Slot, register
 
@@ -29,6 +30,8 @@ class SensorInputs(NamedTuple):
     state: State
     specific_force_B: Vec3  # m/s^2: acceleration less gravity of the centre of mass, as an accelerometer feels it
     normals: tuple[Scalar, ...] = ()  # independent standard normal numbers, as many as the part says it needs
+    rotor_speed: PerRotor | tuple[()] = ()  # rad/s, negative where reversed
+    ground: Scalar = 0.0  # m, height of the ground; 0 where the flight has none
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -36,6 +39,16 @@ class SensorInputs(NamedTuple):
 
 class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
     """A set of sensors: `step` turns the truth of a sampling instant into readings."""
+
+    def model(self, context: Context) -> SensorModel:
+        """What the autopilot may believe of the set, as a data sheet says it; nothing, if a part says nothing.
+
+        Parameters
+        ----------
+        context : Context
+            The believed vehicle, and the sampling period.
+        """
+        return SensorModel()
 
 
 SENSORS = Slot(
@@ -47,6 +60,11 @@ SENSORS = Slot(
 @register("ideal")
 class Ideal(Sensors[Nothing, Nothing]):
     """Perfect sensors."""
+
+    def model(self, context: Context) -> SensorModel:
+        """No noise at all."""
+        exact = SensorNoise(0.0)
+        return SensorModel(exact, exact, exact, exact, exact)
 
     def step(
         self, memory: Nothing, inputs: SensorInputs, parameters: Nothing, dt: Scalar
@@ -106,6 +124,14 @@ class Noisy(Sensors[NoisyMemory, NoisyParameters]):
         """The four standard deviations."""
         s = self.settings
         return NoisyParameters(s.position, s.velocity, s.attitude, s.rate)
+
+    def model(self, context: Context) -> SensorModel:
+        """The four standard deviations, and the delay; the accelerometer has no noise."""
+        s = self.settings
+        timing = Timing(1, s.delay)
+        each = (SensorNoise(std, timing) for std in (s.position, s.velocity, s.attitude, s.rate, 0.0))
+        position, velocity, attitude, rates, force = each
+        return SensorModel(position, velocity, attitude, rates, force)
 
     def initial(self, inputs: SensorInputs, parameters: NoisyParameters) -> NoisyMemory:
         """The first measurement, as often as the delay asks for."""

@@ -176,7 +176,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         InputError
             If a pole is too fast for the sampling period, so that its discrete image cannot be told from 0.
         """
-        vehicle, period = context
+        vehicle, period = context.vehicle, context.period
         fastest = max(self.settings.poles)
         if fastest * period > FASTEST_POLE:
             raise InputError(

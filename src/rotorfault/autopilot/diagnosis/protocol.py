@@ -14,7 +14,7 @@ from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Block, MemoryT, ParametersT
-from rotorfault.model.signals import Diagnosis, Estimate
+from rotorfault.model.signals import Diagnosis, Estimate, Readings
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 
@@ -26,6 +26,7 @@ class DiagnosisInputs(NamedTuple):
     expectation: Expectation  # what sound rotors would have done over the last period
     command: PerRotor  # N, sent at the last instant
     vehicle: Vehicle  # belief
+    readings: Readings = Readings()  # of this instant, such as rotor speeds where they are measured
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -56,7 +57,8 @@ class Oracle(Diagnoser[MemoryT, ParametersT]):
 
 
 def _inputs(instant: Instant) -> DiagnosisInputs:
-    return DiagnosisInputs(instant.estimate, instant.expectation, instant.past.command.thrust, instant.vehicle)
+    command = instant.past.command.thrust
+    return DiagnosisInputs(instant.estimate, instant.expectation, command, instant.vehicle, instant.readings)
 
 
 DIAGNOSIS = Slot(
