@@ -93,11 +93,12 @@ def space_of(controller: str, box: str = "standard") -> Space:
         raise InputError(unknown("box", box, list(BOXES)))
     if controller in SPACES:
         return SPACES[controller] if box == "standard" else [_wide(*entry) for entry in SPACES[controller]]
-    if box != "standard" and is_place(controller):
+    if box != "standard":
         raise InputError(f"box '{box}' is for {', '.join(SPACES)}; write wider bounds into `search` of your class")
-    if not is_place(controller):
+    known = searched()
+    if controller not in known and not is_place(controller):
         raise InputError(
-            f"controller '{controller}' has no search space; allowed: {', '.join(SPACES)}, or FILE.py:NAME"
+            f"controller '{controller}' has no search space; allowed: {', '.join(known)}, or FILE.py:NAME"
         )
     ranges = getattr(part_from(CONTROLLER, controller, allow=(controller,)).factory, "search", {})
     if not ranges:
@@ -112,6 +113,12 @@ def space_of(controller: str, box: str = "standard") -> Space:
                 "allowed: lowest, first and highest value, above 0 and in order"
             )
     return [(key, *bounds) for key, bounds in ranges.items()]
+
+
+def searched() -> list[str]:
+    """Registered controllers that can be tuned: laws, and those that say themselves what may be searched."""
+    known = CONTROLLER.registry
+    return [name for name in known if name in SPACES or getattr(known[name], "search", {})]
 
 
 def _wide(key: str, low: float, start: float, high: float) -> tuple[str, float, float, float]:

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from rotorfault.base.foreign import is_place
 from rotorfault.flight.fly import prepare
 from rotorfault.plant import FAULT
 from rotorfault.reference import REFERENCE
 from rotorfault.scenario.neighbours import neighbour
 from rotorfault.scenario.scenario import Scenario
 from rotorfault.tuning.objectives import onset_of
-from rotorfault.tuning.space import SPACES
 
 FIRST_SEED = 90_000  # neighbours that tests and reports use start at 0
 RECORD = 0.01  # s between two records: what objectives read changes no faster
@@ -69,7 +69,7 @@ def training_groups(
         If a scenario cannot be flown so.
     """
     draw = np.random.Generator(np.random.Philox(np.random.SeedSequence([FIRST_SEED])))
-    plain: dict[str, Any] = {"controller.preset": "none"} if controller in SPACES else {}
+    plain: dict[str, Any] = {} if is_place(controller) else {"controller.preset": "none"}
 
     def base(scenario: Any, own: Mapping[str, Any]) -> Scenario:
         return prepare(scenario, controller, {**plain, **own, **overrides}, allow_code=allow_code)

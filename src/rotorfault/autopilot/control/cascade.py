@@ -28,6 +28,7 @@ from typing import Annotated, Any, Literal, NamedTuple, cast, get_type_hints
 from pydantic import Field, create_model
 
 from rotorfault.autopilot.control.attitude import TRACKINGS, AttitudeReference, Tracking, level_attitude
+from rotorfault.autopilot.control.force_limits import limited_force
 from rotorfault.autopilot.control.protocol import (
     CONTROLLER,
     ControlInputs,
@@ -51,12 +52,12 @@ from rotorfault.autopilot.control.spinning import Spinning
 from rotorfault.autopilot.prediction import Prediction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, any_of, clip, maximum, minimum, sqrt
+from rotorfault.maths.scalar import Scalar, any_of, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Estimate, Reference, Wrench
 from rotorfault.model.telemetry import RPY, Q, W
-from rotorfault.model.vehicle import Vehicle, body_momentum, wrench_of
+from rotorfault.model.vehicle import body_momentum, wrench_of
 
 YawLost = Literal["relaxed", "upright"]
 
@@ -133,18 +134,6 @@ class CascadeMemory(NamedTuple):
     attitude: Any
     reference: AttitudeReference
     relaxed: RelaxedMemory | tuple[()]  # empty where it stays upright
-
-
-def limited_force(f_W: Vec3, available: Scalar, vehicle: Vehicle, parameters: CascadeParameters) -> Vec3:
-    """Specific force in m/s^2 within available thrust [N] and tilt; the vertical part is served first."""
-    most = parameters.thrust_share * available / vehicle.mass
-    f_z = clip(f_W.z, parameters.fall_share * vehicle.gravity, most)
-    # Factored: a compiler may fuse most^2 - f_z^2 into one rounding, which can be below zero where the two are equal.
-    room = minimum(sqrt((most - f_z) * (most + f_z)), parameters.tilt_tangent * f_z)
-    # The small term keeps the quotient finite at rest; it changes nothing that could be measured.
-    horizontal = sqrt(f_W.x * f_W.x + f_W.y * f_W.y + 1e-18)
-    scale = minimum(room / horizontal, 1.0)
-    return Vec3(f_W.x * scale, f_W.y * scale, f_z)
 
 
 class CascadeSignals(NamedTuple):

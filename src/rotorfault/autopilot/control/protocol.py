@@ -25,6 +25,9 @@ from rotorfault.model.slot import Slot
 from rotorfault.model.telemetry import NO_FRAME, Q
 from rotorfault.model.vehicle import Vehicle
 
+Search = Mapping[str, tuple[float, float, float]]
+"""Settings that may be searched, by dotted key: lowest, first and highest value, above 0."""
+
 
 class ControlInputs(NamedTuple):
     """All that a controller may use at one sampling instant."""
@@ -68,7 +71,7 @@ class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):
         Settings that ``rotorfault tune`` may search, by dotted key: lowest, first and highest value, above 0.
     """
 
-    search: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
+    search: ClassVar[Search] = {}
 
 
 def _inputs(instant: Instant) -> ControlInputs:

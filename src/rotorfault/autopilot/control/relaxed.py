@@ -150,7 +150,7 @@ def relaxed_axis(
         Sampling period.
     """
     weight = vehicle.mass * vehicle.gravity
-    given_up = clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
+    given_up = yaw_given_up(vehicle, with_yaw)
     able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
     balance = _balanced_thrust(vehicle, able, parameters.reserve)
 
@@ -177,6 +177,20 @@ def relaxed_axis(
     )  # fmt: skip
     turn = Quat(w, -y * half, x * half, 0.0)
     return RelaxedAxis(memory._replace(lean=lean), given_up, most, to_B, turn)
+
+
+def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:
+    """How much of yaw is given up, 0 to 1.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    with_yaw : scalar, N
+        Thrust that the believed rotors have with yaw in balance.
+    """
+    weight = vehicle.mass * vehicle.gravity
+    return clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
 
 
 def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:
