@@ -24,6 +24,21 @@ def other() -> rf.Flight:
 
 
 @pytest.fixture(scope="session")
+def spinning() -> rf.Flight:
+    """A quadrotor that loses a rotor altogether after half a second, and flies on, spinning."""
+    dead = [{"kind": "total", "rotor": 1, "time": 0.5}]
+    return rf.fly("hover-fault", settings={"vehicle": "mueller-2014", "duration": 2.5, "fault": dead, "seed": 1})
+
+
+@pytest.fixture(scope="session")
+def unlike(spinning: rf.Flight, faulty: rf.Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a quadrotor and of four pairs of rotors, one above the other."""
+    short = {"vehicle": "x8", "duration": 0.3, "period": 0.005, "fault": []}
+    eight = rf.fly("hover-fault", settings=short, engine="python")
+    return rf.view({"four": spinning, "eight": eight}, out=tmp_path_factory.mktemp("page") / "unlike.html")
+
+
+@pytest.fixture(scope="session")
 def page(faulty: rf.Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of one flight."""
     return faulty.view(tmp_path_factory.mktemp("page") / "one.html")

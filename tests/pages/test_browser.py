@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from collections.abc import Iterator
@@ -150,6 +151,68 @@ def test_the_address_holds_the_moment_and_opens_it(opened: Any, two: Path) -> No
     assert again.ask(state) == [1, "orbit", True, 0.1]
 
 
+def test_the_camera_turns_with_a_body_that_spins(opened: Any, unlike: Path) -> None:
+    shown = opened(unlike, "#t=1.6&camera=ride")
+    nose = (
+        "(() => { const { eye, controls, actors } = rotorfault.scene; const at = eye.position.clone()"
+        ".sub(controls.target); const { x, y, z, w } = actors[0].full.quaternion; return Math.atan2(at.y, at.x)"
+        " - Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)); })()"
+    )
+    before = shown.ask(nose)
+    shown.ask("rotorfault.clock.seek(1.75)")
+    turned = shown.ask(nose) - before
+    assert math.remainder(turned, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_spin_is_told_and_has_an_axis(opened: Any, unlike: Path) -> None:
+    shown = opened(unlike, "#t=2.4")
+    assert "turns a second" in shown.page.inner_text("#events")
+    assert float(shown.page.inner_text("#numbers tr:has-text('turns') td")) > 1.0
+    axis = shown.ask(
+        "(() => { const { spin } = rotorfault.scene.actors[0]; spin.updateMatrixWorld(true);"
+        " const m = spin.matrixWorld.elements; return [spin.visible, m[8], m[9], m[10]]; })()"
+    )
+    assert axis[0]
+    rates, (w, x, y, z) = (
+        shown.ask(f"rotorfault.flights[0].row('{name}', rotorfault.flights[0].at(2.4))")
+        for name in ("body_rates", "quaternion")
+    )
+    up = (
+        2.0 * (x * z - w * y) * rates[0] + 2.0 * (y * z + w * x) * rates[1] + (1.0 - 2.0 * (x * x + y * y)) * rates[2]
+    )
+    assert axis[3] / math.hypot(*axis[1:]) == pytest.approx(up / math.hypot(*rates), abs=1e-3)
+
+
+def test_vehicles_with_unlike_numbers_of_rotors_stand_on_one_page(opened: Any, unlike: Path) -> None:
+    shown = opened(unlike, "#t=0.2&view=split")
+    shown.page.evaluate("document.querySelector('#plots').scrollIntoView()")
+    shown.page.wait_for_selector("#plots canvas")
+    shown.page.locator(".card:has-text('rotor 8')").first.scroll_into_view_if_needed()
+    shown.page.wait_for_timeout(200)
+    assert [text for text in shown.complaints if "GPU stall" not in text] == []
+    assert "1 true" not in shown.page.locator(".card:has-text('rotor 8')").first.inner_text()
+    rings = "rotorfault.scene.actors[1].full.rotors.map(({ mount }) => mount.position.toArray())"
+    places = [tuple(round(value, 6) for value in place) for place in shown.ask(rings)]
+    assert len(set(places)) == 8  # pairs stand one above the other
+    assert len({place[:2] for place in places}) == 4
+
+
+def test_paper_has_the_moment_in_light_colours(opened: Any, page: Path) -> None:
+    shown = opened(page, "#t=1.2", scheme="dark")
+    pixel = (
+        "(() => { dispatchEvent(new Event('beforeprint')); const copy = document.querySelector('.on-paper');"
+        " return [...copy.getContext('2d').getImageData(2, 2, 1, 1).data]; })()"
+    )
+    assert shown.ask(pixel) == [255, 255, 255, 255]
+    assert shown.ask("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    drawn = (
+        "document.querySelectorAll('#plots .card canvas').length - document.querySelectorAll('#plots .card').length"
+    )
+    assert shown.ask(drawn) == 0  # also of plots that nobody has looked at
+    shown.ask("dispatchEvent(new Event('afterprint'))")
+    assert shown.ask("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+
+
 def test_two_flights_are_compared_at_one_time(opened: Any, two: Path) -> None:
     shown = opened(two, "#t=1.5")
     ghosts = "rotorfault.scene.actors.map((actor) => [actor.own.visible, actor.ghost.visible])"
@@ -211,13 +274,20 @@ def test_the_attainable_set_is_that_of_a_linear_program(opened: Any, page: Path)
         assert corner @ along == pytest.approx(-best.fun, abs=1e-6)
 
 
-def test_each_flight_has_its_events_and_its_cuts_come_last(opened: Any, two: Path) -> None:
-    shown = opened(two)
-    groups = shown.ask("[...document.querySelectorAll('#events > li')].map((g) => g.innerText.split('\\n'))")
-    assert [group[0] for group in groups] == ["1 · ours", "2 · theirs"]
-    for group in groups:
-        minor = ["limit" in line or " cut " in line for line in group if "rotor" in line or " cut " in line]
-        assert minor == sorted(minor)
+def test_each_flight_has_its_events_and_its_cuts_are_folded_away(opened: Any, unlike: Path) -> None:
+    shown = opened(unlike)
+    words = (
+        "[...document.querySelectorAll('LIST > li')].map("
+        "(group) => [...group.querySelectorAll('b, li')].map((each) => each.textContent))"
+    )
+    happened, minor = (shown.ask(words.replace("LIST", at)) for at in ("#events", "#more-events > ol"))
+    for groups in (happened, minor):
+        assert [group[0].partition(",")[0] for group in groups] == ["■ 1 · four", "■ 2 · eight"]
+    assert len(minor[0]) > 3
+    assert not [line for group in happened for line in group if "limit" in line or " cut " in line]
+    assert all("limit" in line or " cut " in line or line == "none" for group in minor for line in group[1:])
+    shown.page.click("#more-events summary")
+    assert shown.page.locator("#more-events li li").first.is_visible()
 
 
 def test_a_telephone_shows_headlines_of_several_flights_whole(opened: Any, two: Path) -> None:

@@ -147,6 +147,26 @@ def test_it_takes_any_number_of_rotors_and_no_vehicle(faulty: rf.Flight) -> None
     assert [name for name in names if name.startswith("loss.")] == [f"loss.{k}" for k in range(1, 7)]
     assert flight["vehicle"] is None
     assert len(flight["signals"]["diagnosis.evidence"]["columns"]) == 9
+    assert "diagnosis.evidence" not in names  # it never changes
+
+
+@pytest.mark.parametrize("slot", ["diagnosis", "estimator"])
+def test_what_a_part_records_of_its_own_has_a_panel(faulty: rf.Flight, slot: str) -> None:
+    records = faulty.records()
+    count = len(records["time"].values)
+    own = {
+        f"{slot}.evidence": Variable(
+            ("time", "hypothesis"), np.arange(9.0 * count).reshape(count, 9), {"units": "1"}
+        ),
+        f"{slot}.innovation": Variable(("time",), np.arange(float(count)), {"units": "m/s"}),
+        f"{slot}.covariance": Variable(("time", "a", "b"), np.ones((count, 2, 2)), {"units": "1"}),
+    }
+    names = {"hypothesis": Variable(("hypothesis",), np.array([f"h{k}" for k in range(9)]), {})}
+    data = FlightData({**records.variables, **own}, {**records.coordinates, **names}, records.attrs)
+    found = {panel.name: panel for panel in panels(derived(data, None), {})}
+    assert [curve.label for curve in found[f"{slot}.evidence"].curves] == [f"h{k}" for k in range(9)]
+    assert (found[f"{slot}.innovation"].unit, found[f"{slot}.innovation"].title) == ("m/s", "innovation")
+    assert f"{slot}.covariance" not in found
 
 
 def test_panels_leave_out_estimates_that_are_the_truth(faulty: rf.Flight) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 import rotorfault as rf
 from rotorfault.pages.verdict import headline
 
@@ -39,4 +41,12 @@ def test_a_fault_that_nobody_sees_is_missed() -> None:
 
 def test_a_stuck_rotor_has_no_margin_that_a_loss_would_tell() -> None:
     found = facts(fault=[{"kind": "stuck", "rotor": 2, "time": 0.5, "thrust": 3.0}], duration=1.0)
+    assert "least margin" not in found
+
+
+def test_a_flight_that_only_a_spin_keeps_up_tells_how_fast_it_must_turn(spinning: rf.Flight) -> None:
+    """Of a vehicle whose printed solution turns once in 0.30 s, about what the flight does."""
+    found = {fact.term: fact.value for fact in headline(spinning.records())}
+    turns = float(found["needed to hover"].removesuffix(" turns/s"))
+    assert turns == pytest.approx(1.0 / rf.relaxed_hover("mueller-2014", [1]).period, rel=0.02)
     assert "least margin" not in found

@@ -83,6 +83,9 @@ LAZY = {
     },
     "rotorfault.flight.fly": {"rotorfault.results.dataset": XARRAY},
     "rotorfault.flight.many": {"xarray": XARRAY},
+    "rotorfault.pages.verdict": {
+        "rotorfault.analysis.relaxed_hover": "brings scipy.optimize; only flights without a hover upright ask for it"
+    },
     "rotorfault.reference.sources": {"rotorfault.reference.curve": "scipy takes longer to load than a flight to fly"},
     "rotorfault.report.film": {"imageio_ffmpeg": OPTIONAL},
     "rotorfault.results.exporters.mat": {"scipy.io": "takes longer to load than a flight to fly"},

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rotorfault as rf
-from rotorfault.results.events import Event, events, isolation_time, onsets
+from rotorfault.results.events import Event, events, isolation_time, onsets, spins
 from rotorfault.results.flight_data import FlightData, Variable
 
 TIME = np.arange(1000) * 0.001
@@ -53,6 +53,18 @@ def test_isolated_is_when_the_faulty_rotors_are_flagged_and_no_others() -> None:
     never = made_up({"fault_flag": flags((1, 320, 1000))}, scores)
     assert isolation_time(never, onsets(scores)) is None
     assert "isolated" not in [event.kind for event in events(never)]
+
+
+def test_a_spin_is_a_whole_turn_at_more_than_one_a_second() -> None:
+    """Two turns in half a second are one; a swerve of a third of a turn is none, however fast."""
+    rates = np.zeros((1000, 3))
+    rates[100:600] = [0.0, 0.6 * 8.0 * np.pi, 0.8 * 8.0 * np.pi]  # about any axis
+    rates[700:735] = [0.0, 0.0, 20.0 * np.pi]
+    data = made_up({"body_rates": rates}, {})
+    assert texts(data, "spin") == ["spins for 500 ms, up to 4 turns a second"]
+    assert spins(data)
+    assert not spins(made_up({"body_rates": np.where(TIME[:, None] < 0.7, 0.0, rates)}, {}))
+    assert not spins(made_up({}, {}))
 
 
 def test_a_limit_is_told_once_with_short_breaks_and_anew_after_long_ones() -> None:

@@ -90,7 +90,7 @@ export const degrees = (radians) => (radians * 180) / Math.PI;
 const SHAPES = {
   fault: 'M2 2 L10 10 M10 2 L2 10', alarm: 'M6 1.5 L11 10.5 L1 10.5 Z', false_alarm: 'M6 1.5 L11 10.5 L1 10.5 Z', isolated: 'M6 1 a5 5 0 1 0 .01 0 M6 4 a2 2 0 1 0 .01 0',
   cleared: 'M6 2 a4 4 0 1 0 .01 0', switch: 'M6 1 L11 6 L6 11 L1 6 Z', touch_down: 'M1 2 L11 2 L6 10.5 Z', end: 'M2 2 H10 V10 H2 Z',
-  saturation: 'M1 6 H11', given_up: 'M1 4 H11 M1 8 H11',
+  spin: 'M10.5 6 a4.5 4.5 0 1 1 -1.6 -3.4 M9.6 .6 V3.2 H7', saturation: 'M1 6 H11', given_up: 'M1 4 H11 M1 8 H11',
 };
 const FILLED = ['alarm', 'switch', 'touch_down', 'end'];
 

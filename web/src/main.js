@@ -41,7 +41,7 @@ async function start() {
   part('sets').hidden = !flights.some((flight) => flight.vehicle);
   const plots = new Plots(part('plots'), flights, clock, (time) => clock.seek(time));
   const timeline = new Timeline(
-    { lanes: part('lanes'), scrubber: part('scrubber'), clockText: part('time'), play: part('play'), speed: part('speed'), zoom: part('zoom'), list: part('events'), latest: part('latest') },
+    { lanes: part('lanes'), scrubber: part('scrubber'), clockText: part('time'), play: part('play'), speed: part('speed'), zoom: part('zoom'), list: part('events'), rest: part('more-events'), latest: part('latest') },
     flights, clock, (window) => plots.show(window),
   );
 
@@ -75,7 +75,7 @@ async function start() {
   };
   const setCamera = (kind) => {
     scene.setCamera(kind);
-    part('camera').textContent = kind === 'follow' ? 'Orbit the path' : 'Follow the vehicle';
+    part('camera').value = scene.camera;
     keep();
   };
   const setSplit = (split) => {
@@ -97,7 +97,10 @@ async function start() {
   clock.onTime(showNumbers, NUMBERS);
   clock.onChange(keep);
   for (const tab of document.querySelectorAll('#tabs button')) tab.addEventListener('click', () => choose(Number(tab.dataset.index)));
-  part('camera').addEventListener('click', () => setCamera(scene.camera === 'follow' ? 'orbit' : 'follow'));
+  part('camera').addEventListener('change', () => {
+    setCamera(part('camera').value);
+    part('camera').blur(); // so that the keys are those of the page again
+  });
   part('home').addEventListener('click', () => scene.home());
   part('split').addEventListener('click', () => setSplit(!scene.split));
   part('help').addEventListener('click', () => part('keys').toggleAttribute('hidden'));
@@ -114,7 +117,7 @@ async function start() {
       Home: () => clock.seek(clock.start), End: () => clock.seek(clock.end),
       n: () => timeline.toEvent(1), p: () => timeline.toEvent(-1),
       '+': () => clock.faster(1), '-': () => clock.faster(-1), ']': () => clock.faster(1), '[': () => clock.faster(-1),
-      f: () => setCamera('follow'), o: () => setCamera('orbit'), r: () => scene.home(),
+      f: () => setCamera('follow'), t: () => setCamera('ride'), o: () => setCamera('orbit'), r: () => scene.home(),
       s: () => flights.length > 1 && setSplit(!scene.split), z: () => !part('zoom').hidden && part('zoom').click(),
       '?': () => part('help').click(),
     };

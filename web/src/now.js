@@ -9,6 +9,7 @@ const ROWS = [
   ['tilt', '°', (f, i) => tilt(f.row('quaternion', i))],
   ['yaw', '°', (f, i) => direction(f.value('attitude', 2, i))],
   ['yaw rate', '°/s', (f, i) => degrees(f.value('body_rates', 2, i))],
+  ['turns', '1/s', (f, i) => (f.spins ? size(f.row('body_rates', i)) / (2 * Math.PI) : NaN)],
   ['wind', 'm/s', (f, i) => size(f.row('wind', i))],
 ];
 

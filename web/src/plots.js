@@ -3,7 +3,8 @@
 import uPlot from 'uplot';
 import { DASHES, colourOf, colourOfColumn, element, onTheme, palette, shown, unitText } from './look.js';
 
-const HEIGHT = 150;
+const HEIGHT = 150; // px
+const PRINTED = 332; // px, on paper
 
 /** How a curve looks by its role, for a page with one flight. */
 function lookOf(role) {
@@ -70,7 +71,17 @@ export class Plots {
     this.build();
     onTheme(() => this.again());
     addEventListener('resize', () => this.again());
-    addEventListener('beforeprint', () => this.cards.forEach((card) => this.draw(card)));
+    addEventListener('beforeprint', () => {
+      this.printing = true; // paper has two columns, whatever the screen has
+      this.cards.forEach((card) => {
+        this.draw(card);
+        card.plot?.setSize({ width: PRINTED, height: HEIGHT });
+      });
+    });
+    addEventListener('afterprint', () => {
+      this.printing = false;
+      this.again();
+    });
     clock.onTime(() => this.lines());
     clock.onTime(() => this.mark(), 10);
     clock.onChange(() => this.mark());
@@ -157,7 +168,7 @@ export class Plots {
   curves(panel) {
     const alone = this.flights.length === 1;
     return this.flights.flatMap((flight, index) =>
-      panel.curves.filter((curve) => flight.has(curve.signal)).map((curve, k) => {
+      panel.curves.filter((curve) => flight.signals[curve.signal]?.values[curve.column]).map((curve, k) => {
         const look = { ...lookOf(curve.role) };
         if (curve.role === 'more') {
           look.stroke = alone ? colourOfColumn(k) : colourOf(index);
@@ -224,9 +235,9 @@ export class Plots {
     c.rect(left, top, width, height);
     c.clip();
     const flight = this.flights[this.chosen];
-    if (card.panel.shade && flight.has(card.panel.shade[0])) {
-      const [signal, column] = card.panel.shade;
-      const values = flight.signals[signal].values[column];
+    const [signal, column] = card.panel.shade ?? [];
+    const values = flight.signals[signal]?.values[column]; // a flight with fewer rotors has none
+    if (values) {
       c.fillStyle = `${colours.purple}30`;
       let from = -1;
       for (let i = 0; i <= values.length; i++) {
@@ -339,6 +350,7 @@ export class Plots {
   }
 
   again() {
+    if (this.printing) return;
     for (const card of this.cards) {
       card.plot?.destroy();
       card.plot = null;

@@ -8,6 +8,9 @@ import { Arrow, VehicleModel, label } from './vehicle3d.js';
 const TRAIL = 3000; // points of a path
 const LEAST_RATIO = 0.6; // of the screen's pixels: coarser is hard to read
 const NOSE = 0.6; // s of the trail of the nose
+const CAMERAS = ['follow', 'ride', 'orbit'];
+const Z = new THREE.Vector3(0, 0, 1);
+const SPIN = 2 * Math.PI; // rad/s: from one turn a second on, the axis of the turning is drawn
 
 /** The points of a path, with the record of each. */
 function pathOf(flight, signal) {
@@ -67,6 +70,7 @@ export class Scene {
     this.chosen = 0;
     this.split = false;
     this.camera = 'follow';
+    this.turned = 0;
     this.time = 0;
     this.dirty = true;
     this.frames = [];
@@ -80,8 +84,10 @@ export class Scene {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     stage.append(this.renderer.domElement);
     this.names = flights.map((flight, k) => {
-      const name = element('span', 'view-name', `${k + 1} · ${flight.label}`);
-      name.dataset.flight = k;
+      const name = element('span', 'view-name');
+      const colour = element('span', '', '■');
+      colour.dataset.flight = k;
+      name.append(colour, ` ${k + 1} · ${flight.label}`);
       name.hidden = true;
       stage.append(name);
       return name;
@@ -96,7 +102,9 @@ export class Scene {
     onTheme(() => {
       this.build();
       this.show(this.time);
+      this.draw(); // at once, for paper does not wait for the next frame
     });
+    addEventListener('beforeprint', () => this.onPaper());
     new ResizeObserver(() => this.resize()).observe(stage);
     this.resize();
     this.renderer.setAnimationLoop(() => this.draw());
@@ -142,10 +150,11 @@ export class Scene {
     const nose = line(new Float32Array(3 * 64), colours.vermilion, 0.9);
     const wind = new Arrow(colours.sky, 0.035 * full.reach);
     const wish = new Arrow(colours.purple, 0.022 * full.reach);
+    const spin = new Arrow(colours.ink, 0.016 * full.reach);
     const own = new THREE.Group();
-    own.add(full, reference, target, height, nose, wind, wish);
+    own.add(full, reference, target, height, nose, wind, wish, spin);
     this.world.add(own, ghost, path, trail);
-    return { own, full, ghost, path, trail, reference, target, height, nose, wind, wish, reach: full.reach, records: flown.records };
+    return { own, full, ghost, path, trail, reference, target, height, nose, wind, wish, spin, reach: full.reach, records: flown.records };
   }
 
   ground(colours) {
@@ -206,7 +215,7 @@ export class Scene {
     const size = new THREE.Vector3();
     this.box.getCenter(middle);
     this.box.getSize(size);
-    const follow = this.camera === 'follow';
+    const follow = this.camera !== 'orbit';
     const target = follow ? this.place(this.chosen) : middle;
     const away = follow ? 6.2 * this.reach : Math.max(1.5 * size.length(), 7 * this.reach);
     this.eye.near = Math.max(away / 300, 1e-3);
@@ -218,9 +227,18 @@ export class Scene {
     this.dirty = true;
   }
 
+  /** `follow` the vehicle, `ride` with it as it turns, or `orbit` the whole path. */
   setCamera(kind) {
-    this.camera = kind === 'orbit' ? 'orbit' : 'follow';
+    this.camera = CAMERAS.includes(kind) ? kind : 'follow';
+    this.turned = this.heading(this.chosen);
     this.home();
+  }
+
+  /** Where the nose of a flight points, in rad about the vertical. */
+  heading(k) {
+    const flight = this.flights[k];
+    const q = flight.row('quaternion', flight.at(this.time));
+    return q && q.every(Number.isFinite) ? Math.atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] ** 2 + q[3] ** 2)) : 0;
   }
 
   place(k) {
@@ -233,10 +251,16 @@ export class Scene {
     if (!this.renderer) return;
     this.time = time;
     this.flights.forEach((flight, k) => this.showFlight(flight, this.actors[k], flight.at(time), time));
-    if (this.camera === 'follow') {
+    if (this.camera !== 'orbit') {
       const moved = this.place(this.chosen).sub(this.controls.target);
       this.controls.target.add(moved);
       this.eye.position.add(moved);
+      if (this.camera === 'ride') {
+        const heading = this.heading(this.chosen);
+        const away = this.eye.position.clone().sub(this.controls.target).applyAxisAngle(Z, heading - this.turned);
+        this.eye.position.copy(this.controls.target).add(away);
+        this.turned = heading;
+      }
       this.controls.update();
     }
     this.dirty = true;
@@ -282,6 +306,15 @@ export class Scene {
       ).normalize());
       actor.wish.setLength(2.1 * reach);
     }
+    const rates = flight.row('body_rates', record);
+    const rate = rates ? Math.hypot(...rates) : 0;
+    actor.spin.visible = rate > SPIN && Number.isFinite(rate);
+    if (actor.spin.visible) {
+      const along = new THREE.Vector3(...rates).divideScalar(rate).applyQuaternion(actor.full.quaternion);
+      actor.spin.position.set(...p);
+      actor.spin.setDirection(along);
+      actor.spin.setLength(1.9 * reach);
+    }
   }
 
   noseTrail(flight, actor, record) {
@@ -299,6 +332,16 @@ export class Scene {
       points.setXYZ(i, p[0] + tip.x, p[1] + tip.y, p[2] + tip.z);
     }
     points.needsUpdate = true;
+  }
+
+  /** Browsers print a picture in 3-D as it was on the screen: paper gets a copy, which is light. */
+  onPaper() {
+    this.dirty = true;
+    this.draw();
+    const { domElement } = this.renderer;
+    this.copy ??= this.stage.appendChild(element('canvas', 'on-paper'));
+    [this.copy.width, this.copy.height] = [domElement.width, domElement.height];
+    this.copy.getContext('2d').drawImage(domElement, 0, 0);
   }
 
   resize() {
@@ -334,11 +377,17 @@ export class Scene {
     this.dirty = false;
     const offset = this.eye.position.clone().sub(this.controls.target);
     const home = this.eye.position.clone();
+    const look = this.eye.quaternion.clone();
     this.renderer.setScissorTest(true);
     for (const [x, y, w, h, k] of this.views()) {
       if (this.split) {
         this.visible(k, true);
-        if (this.camera === 'follow') this.eye.position.copy(this.place(k)).add(offset);
+        if (this.camera !== 'orbit') {
+          const turn = this.camera === 'ride' ? this.heading(k) - this.heading(this.chosen) : 0;
+          const size = this.actors[k].reach / this.reach; // so that each fills its picture
+          this.eye.position.copy(this.place(k)).add(offset.clone().multiplyScalar(size).applyAxisAngle(Z, turn));
+          this.eye.lookAt(this.place(k));
+        }
       }
       this.eye.aspect = w / h;
       this.eye.updateProjectionMatrix();
@@ -346,6 +395,7 @@ export class Scene {
       this.renderer.setScissor(x, y, w, h);
       this.renderer.render(this.world, this.eye);
       this.eye.position.copy(home);
+      this.eye.quaternion.copy(look);
     }
     if (this.split) this.visible(this.chosen, false);
     this.pace();

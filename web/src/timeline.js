@@ -3,13 +3,13 @@
 import { SPEEDS } from './clock.js';
 import { colourOf, element, onTheme, palette, shown, sign } from './look.js';
 
-const WORDED = ['fault', 'alarm', 'false_alarm', 'isolated', 'switch', 'touch_down', 'end'];
+const WORDED = ['fault', 'alarm', 'false_alarm', 'isolated', 'switch', 'spin', 'touch_down', 'end'];
 
-const AT_LAST = ['saturation', 'given_up'];
+const ASIDE = ['saturation', 'given_up'];
 
 function colourFor(kind) {
   const c = palette();
-  return { fault: c.vermilion, alarm: c.purple, false_alarm: c.orange, isolated: c.green, cleared: c.soft, switch: c.blue, touch_down: c.green, end: c.ink, saturation: c.orange, given_up: c.vermilion }[kind];
+  return { fault: c.vermilion, alarm: c.purple, false_alarm: c.orange, isolated: c.green, cleared: c.soft, switch: c.blue, spin: c.blue, touch_down: c.green, end: c.ink, saturation: c.orange, given_up: c.vermilion }[kind];
 }
 
 /** What happened at once, and is of one kind, in one line. */
@@ -24,8 +24,8 @@ function together(events) {
 }
 
 export class Timeline {
-  constructor({ lanes, scrubber, clockText, play, speed, zoom, list, latest }, flights, clock, onWindow) {
-    Object.assign(this, { lanes, scrubber, clockText, play, speed, zoom, list, latest, flights, clock, onWindow });
+  constructor({ lanes, scrubber, clockText, play, speed, zoom, list, rest, latest }, flights, clock, onWindow) {
+    Object.assign(this, { lanes, scrubber, clockText, play, speed, zoom, list, rest, latest, flights, clock, onWindow });
     this.whole = [clock.start, clock.end];
     this.window = this.whole;
     scrubber.min = 0;
@@ -117,7 +117,7 @@ export class Timeline {
 
   drawLane(lane, flight, width) {
     // Where the words of each row end, in px. Several flights have a row each, so that the plots keep their room.
-    const ends = new Array({ 1: 3, 2: 1, 3: 1 }[this.flights.length] ?? 0).fill(-Infinity);
+    const ends = new Array({ 1: 3, 2: 1 }[this.flights.length] ?? 0).fill(-Infinity);
     let rows = 0;
     for (const event of together(flight.events)) {
       // A flight ends one period after its last record.
@@ -162,24 +162,37 @@ export class Timeline {
     lane.style.height = `calc(${(rows + 1) * 1.3}rem + 8px)`;
   }
 
-  /** All events, to be read and to be gone to; of several flights each has its own, limits and cuts at the end. */
+  /** All events, to be read and to be gone to: what happened, and folded away which limits were met and what was cut. */
   fill() {
-    this.list.replaceChildren();
+    const aside = (event) => ASIDE.includes(event.kind);
+    this.lists(this.list, (event) => !aside(event));
+    const count = this.flights.reduce((sum, flight) => sum + flight.events.filter(aside).length, 0);
+    this.rest.hidden = !count;
+    this.rest.firstElementChild.textContent = `Rotors at their limits, and what allocation cut: ${count}`;
+    this.lists(this.rest.lastElementChild, aside);
+  }
+
+  /** Fill a list with some events; of several flights each has its own. */
+  lists(list, which) {
     const several = this.flights.length > 1;
-    this.list.classList.toggle('several', several);
+    list.replaceChildren();
+    list.classList.add('events');
+    list.classList.toggle('several', several);
     this.flights.forEach((flight, k) => {
-      let parent = this.list;
+      let parent = list;
       if (several) {
         const group = element('li');
-        const name = element('b', '', `${k + 1} · ${flight.label}`);
-        name.style.color = colourOf(k);
+        const colour = element('span', '', '■ ');
+        colour.style.color = colourOf(k);
+        const name = element('b');
+        name.append(colour, `${k + 1} · ${flight.label}`);
         parent = element('ol');
         group.append(name, parent);
-        this.list.append(group);
+        list.append(group);
       }
-      const aside = (event) => several && AT_LAST.includes(event.kind);
-      for (const event of [...flight.events].sort((a, b) => aside(a) - aside(b) || a.time - b.time)) parent.append(this.row(event));
-      if (!parent.children.length) parent.append(element('li', 'soft', 'nothing happened to any rotor'));
+      const found = flight.events.filter(which).sort((a, b) => a.time - b.time);
+      for (const event of found) parent.append(this.row(event));
+      if (!found.length) parent.append(element('li', 'soft', 'none'));
     });
   }
 

@@ -12,9 +12,10 @@ function material(colour, opacity = 1) {
 
 /** An arrow along z of length 1, to be scaled. */
 export class Arrow extends THREE.Group {
-  constructor(colour, radius, opacity = 1) {
+  constructor(colour, radius) {
     super();
-    const look = material(colour, opacity);
+    // In shade too it has the colour that the legend gives it.
+    const look = new THREE.MeshLambertMaterial({ color: colour, emissive: colour, emissiveIntensity: 0.5 });
     this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 1, 10).rotateX(Math.PI / 2).translate(0, 0, 0.5), look);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(2.4 * radius, 6 * radius, 14).rotateX(Math.PI / 2), look);
     this.size = radius;
@@ -38,7 +39,17 @@ export class Arrow extends THREE.Group {
 
   setColour(colour) {
     this.shaft.material.color.set(colour);
+    this.shaft.material.emissive.set(colour);
   }
+}
+
+/** Which level each rotor has among those at its place: 0 the first, 1 the next below; null where it is alone. */
+function levels(rotors, reach) {
+  const near = (a, b) => Math.hypot(...a.position.map((value, k) => value - b.position[k])) < 0.1 * reach;
+  return rotors.map((rotor, i) => {
+    const same = rotors.map((other, j) => [other, j]).filter(([other]) => near(rotor, other));
+    return same.length > 1 ? same.findIndex(([, j]) => j === i) : null;
+  });
 }
 
 /** A text that faces the reader. */
@@ -91,6 +102,7 @@ export class VehicleModel extends THREE.Group {
   build() {
     this.clear();
     this.rotors = [];
+    this.axis = null;
     const { reach, ghost } = this;
     const rotors = this.vehicle?.rotors ?? [];
     const colours = palette();
@@ -104,13 +116,17 @@ export class VehicleModel extends THREE.Group {
     nose.position.set(0.3 * reach, 0, 0);
     this.add(nose);
     const radius = discRadius(rotors, reach);
+    const stacked = levels(rotors, reach);
     rotors.forEach((rotor, i) => {
       const place = new THREE.Vector3(...rotor.position);
       const arm = new THREE.Mesh(new THREE.CylinderGeometry(0.028 * reach, 0.028 * reach, place.length(), 8), look);
+      const below = stacked[i] ?? 0;
+      // Rotors whose file has them at one place are drawn one below the other.
+      const shift = stacked[i] === null ? 0 : (0.09 - 0.3 * below) * reach;
       arm.position.copy(place).multiplyScalar(0.5);
       arm.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), place.clone().normalize());
       const mount = new THREE.Group();
-      mount.position.copy(place);
+      mount.position.copy(place).add(new THREE.Vector3(0, 0, shift));
       mount.quaternion.setFromUnitVectors(UP, new THREE.Vector3(...rotor.axis).normalize());
       const turn = rotor.turn > 0 ? colours.vermilion : colours.blue;
       const ring = new THREE.Mesh(new THREE.TorusGeometry(radius, 0.018 * reach, 6, 32), material(ghost ?? turn, opacity));
@@ -128,12 +144,13 @@ export class VehicleModel extends THREE.Group {
         parts.thrust = new Arrow(colours.blue, 0.03 * reach);
         parts.believed = new Arrow(colours.orange, 0.03 * reach);
         // Side by side, across the arm, so that one does not hide the other.
-        const aside = new THREE.Vector3(-place.y, place.x, 0).normalize().multiplyScalar(0.055 * reach);
+        const aside = new THREE.Vector3(-place.y, place.x, 0).normalize().multiplyScalar((0.055 + 0.13 * below) * reach);
         parts.thrust.position.copy(aside).setZ(0.08 * reach);
         parts.believed.position.copy(aside).negate().setZ(0.08 * reach);
         mount.add(parts.flagged, parts.thrust, parts.believed);
         const number = label(String(i + 1), colours.ink, 0.3 * reach);
-        number.position.copy(place).multiplyScalar(1 + (1.45 * radius) / (place.length() || 1)).setZ(place.z + 0.1 * reach);
+        const lift = stacked[i] === null ? 0.1 : 0.3 - 0.45 * below;
+        number.position.copy(place).multiplyScalar(1 + (1.45 * radius) / (place.length() || 1)).setZ(place.z + lift * reach);
         if (place.length() < 1e-6) number.position.set(0, 0, 0.4 * reach);
         this.add(number);
       }
@@ -147,11 +164,22 @@ export class VehicleModel extends THREE.Group {
     }
   }
 
-  /** Show a record of a flight; `age` in s turns the blades. */
+  /** Where the rotors pull together, in body axes: z where none is tilted. */
+  pull(flight, record) {
+    const sum = new THREE.Vector3();
+    (this.vehicle?.rotors ?? []).forEach((rotor, i) => {
+      const thrust = flight.value('thrust', i, record);
+      if (Number.isFinite(thrust)) sum.addScaledVector(new THREE.Vector3(...rotor.axis), thrust);
+    });
+    return sum.length() > 1e-6 ? sum.normalize() : UP;
+  }
+
+  /** Show a record of a flight; `time` in s turns the blades. */
   update(flight, record, time) {
     const q = flight.row('quaternion', record);
     if (q && q.every(Number.isFinite)) this.quaternion.set(q[1], q[2], q[3], q[0]);
     const most = this.vehicle?.thrust_max || 1;
+    this.axis?.setDirection(this.pull(flight, record));
     this.rotors.forEach((parts, i) => {
       const speed = flight.value('rotor_speed', i, record);
       if (Number.isFinite(speed)) {

@@ -28,7 +28,7 @@ from rotorfault.pages.panels import Panel, derived, panels
 from rotorfault.pages.style import environment, script_data
 from rotorfault.pages.tracks import packed, packed_times, thinned
 from rotorfault.pages.verdict import headline
-from rotorfault.results.events import events
+from rotorfault.results.events import events, spins
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import configuration_of, true_vehicle_file
 
@@ -86,6 +86,7 @@ def page(flights: Sequence[Shown]) -> str:
         heading=names,
         flights=[{"label": flight.label, "facts": headline(flight.data)} for flight in flights],
         records=[_provenance(flight) for flight in flights],
+        spins=any(spins(flight.data) for flight in flights),
         thinned=_thinned(payload),
         data=script_data(payload),
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
@@ -190,13 +191,13 @@ def _vehicle(data: FlightData, file: VehicleFile | None) -> dict[str, Any] | Non
         "rotors": [
             {
                 "name": _short(rotor.name),
-                "position": [x, y, 0.0],
+                "position": [*place],
                 "axis": [*axis],
                 "limits": [gain * low, gain * high],  # N, of its thrust
                 "turn": -1.0 if rotor.yaw == "+" else 1.0,  # about its axis: drag turns the body the other way
                 "wrench": [float(w.thrust), *map(float, w.torque_B)],
             }
-            for rotor, (x, y, _), axis, w, gain, low, high in zip(
+            for rotor, place, axis, w, gain, low, high in zip(
                 file.rotor, file.places, file.axes, wrenches, *ranges, strict=True
             )
         ],

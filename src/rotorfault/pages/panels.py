@@ -6,7 +6,7 @@ panel shows is still on the page, for the reader to choose.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,9 @@ from rotorfault.results.derived import believed_stuck_at, believed_thrust, given
 from rotorfault.results.flight_data import FlightData, Variable
 
 TRUE, BELIEVED, COMMAND, ASKED, LIMIT, THRESHOLD = "true", "believed", "command", "asked", "limit", "threshold"
+MORE = "more"  # a curve that no role is known of
+OWN = {"diagnosis": "Diagnosis", "estimator": "Estimator"}  # slots whose own signals have panels, with their heading
+WIDEST = 32  # columns of a signal that one plot can show
 
 
 class Curve(NamedTuple):
@@ -25,7 +28,7 @@ class Curve(NamedTuple):
     signal: str
     column: int
     label: str
-    role: str  # true, believed, command, asked, limit or threshold: a look each
+    role: str  # true, believed, command, asked, limit, threshold or more: a look each
 
 
 class Panel(NamedTuple):
@@ -94,7 +97,9 @@ def panels(data: FlightData, limits: Mapping[str, float]) -> list[Panel]:
         ``thrust_min`` and ``thrust_max`` of a rotor in N, where they are known.
     """
     found = [*_motion(data), *_rotors(data, limits), *_diagnosis(data), *_wrench(data)]
-    return [panel for panel in found if panel.curves]
+    found = [panel for panel in found if panel.curves]
+    shown = {curve.signal for panel in found for curve in panel.curves}
+    return [*found, *_own(data, shown)]
 
 
 def _of(data: FlightData, name: str) -> Array:
@@ -180,6 +185,28 @@ def _diagnosis(data: FlightData) -> Iterator[Panel]:
         )
         title = f"rotor {number}: loss of effectiveness"
         yield Panel(f"loss.{number}", "Diagnosis", title, "1", _curves(data, *evidence), _flag(data, k))
+
+
+def _own(data: FlightData, shown: Collection[str]) -> Iterator[Panel]:
+    """What diagnosis and estimator record of their own, a panel a signal, as they name it."""
+    for name in sorted(set(map(str, data.variables)) - set(shown)):
+        slot, _, title = name.partition(".")
+        if slot not in OWN or data[name].dims[:1] != ("time",):
+            continue
+        values, dims = np.asarray(data[name].values), data[name].dims[1:]
+        if values.ndim > 2 or values.size == 0 or not np.issubdtype(values.dtype, np.number):
+            continue
+        labels = _labels(data, dims[0], values.shape[1]) if dims else ["value"]
+        if len(labels) <= WIDEST and not (values == values[0]).all():  # what never changes is a number, and no plot
+            whose = f"{dims[0]} " if dims and labels[0].isdigit() else ""
+            curves = tuple(Curve(name, k, f"{whose}{label}", MORE) for k, label in enumerate(labels))
+            yield Panel(name, OWN[slot], title.replace("_", " "), _unit(data, name), curves)
+
+
+def _labels(data: FlightData, dim: str, count: int) -> list[str]:
+    """Names of the columns of a signal, numbers from 1 where they have none."""
+    named = data.coordinates.get(dim)
+    return list(map(str, range(1, count + 1) if named is None else named.values))
 
 
 def _wrench(data: FlightData) -> Iterator[Panel]:

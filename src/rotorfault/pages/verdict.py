@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,11 +13,13 @@ from rotorfault.analysis.hover import hover_margin
 from rotorfault.loop.scores import RECOVERED, SURVIVED, YAW_KEPT
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.vehicle import Vehicle
 from rotorfault.results.derived import stuck_at
 from rotorfault.results.events import isolation_time, onsets
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import true_vehicle_file
 
+DEAD = 0.999  # loss of a rotor that counts as dead
 LOOKS = {"settled": "good", "tracked": "good", "landed": "good", "offset": "fair", "interrupted": "fair"}
 
 
@@ -89,8 +91,8 @@ def _consequences(scores: Mapping[str, Any]) -> list[Fact]:
         if back is None or not math.isfinite(back):
             facts.append(Fact("never", "to recover", note, "bad"))
         elif scores.get("outcome") == "offset" and (turned := abs(scores.get("yaw_error_end") or 0.0)) > YAW_KEPT:
-            note = f"in place it is back after {back:.3g} s, but at the end its yaw is {turned:.3g} rad off"
-            facts.append(Fact("yaw off", "to recover", note, "fair"))
+            note = f"{note}; at the end its yaw is {turned:.3g} rad off"
+            facts.append(Fact("0 s" if back == 0.0 else f"{back:.3g} s", "to recover, yaw off", note, "fair"))
         else:
             text = f"never beyond {RECOVERED:g} m" if back == 0.0 else f"{back:.3g} s"
             facts.append(Fact("0 s" if back == 0.0 else text, "to recover", text if back == 0.0 else note, "good"))
@@ -125,7 +127,21 @@ def _margin(data: FlightData) -> Fact | None:
     note = "no hover with yaw held at some time; what is left with yaw given up, at least"
     if math.isfinite(least_free):
         return Fact(f"{least_free:.2g} m/s²", "least margin, yaw given up", note, "fair")
-    return Fact("none", "least margin", "at some time no hover was possible with the true losses", "bad")
+    return _in_a_spin(vehicle, [k + 1 for k in range(vehicle.rotors) if loss[-1, k] > DEAD])
+
+
+def _in_a_spin(vehicle: Vehicle, dead: Sequence[int]) -> Fact:
+    """What hover is left without rotors that are dead, where there is none upright."""
+    from rotorfault.analysis.relaxed_hover import relaxed_hover
+
+    hover = relaxed_hover(vehicle, dead) if 0 < len(dead) < vehicle.rotors else None
+    if hover is None or not hover.possible or not math.isfinite(hover.period):
+        return Fact("none", "least margin", "at some time no hover was possible with the true losses", "bad")
+    note = (
+        f"no hover upright; spinning, at {1.0 / hover.period:.2g} turns a second, the vehicle carries itself: the "
+        f"living rotor with the least thrust then has {hover.reserve:.2g} of their mean"
+    )
+    return Fact(f"{1.0 / hover.period:.2g} turns/s", "needed to hover", note, "fair")
 
 
 def _milliseconds(seconds: float) -> str:

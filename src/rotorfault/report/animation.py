@@ -39,7 +39,7 @@ LINES = 5  # of events at once
 SMALLEST = 0.085  # of the box: a smaller vehicle is drawn larger
 REACH = 12.0  # reference sizes that a path may leave the box by before the box stops growing
 SERIOUS = ("fault", "false_alarm", "end")
-TOLD = ("fault", "alarm", "false_alarm", "cleared", "isolated", "switch", "touch_down")
+TOLD = ("fault", "alarm", "false_alarm", "cleared", "isolated", "switch", "spin", "touch_down")
 
 
 class Moment(NamedTuple):

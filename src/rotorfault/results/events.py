@@ -26,6 +26,8 @@ STEADY = 5  # records before and after a step
 WHEN = ("rotor", "time", "start")  # settings of a fault that its event tells by itself
 AT_LIMIT = 1e-9  # N
 STATES = 8  # values that a signal may take to count as a mode
+TURN = 2.0 * np.pi  # rad
+SPIN = TURN  # rad/s: a body that makes more than a turn a second spins
 
 Found = TypeVar("Found")
 
@@ -34,7 +36,7 @@ class Event(NamedTuple):
     """Something that happened."""
 
     time: float  # s
-    kind: str  # fault, alarm, false_alarm, cleared, isolated, switch, saturation, given_up, touch_down, end
+    kind: str  # fault, alarm, false_alarm, cleared, isolated, switch, spin, saturation, given_up, touch_down, end
     text: str
     rotor: int = 0  # number of the rotor, 0 for none
     until: float | None = None  # s, where it lasts
@@ -68,6 +70,7 @@ def events(data: FlightData) -> list[Event]:
         *_faults(data, time, scores),
         *_alarms(data, time, scores),
         *_switches(data, time, scores),
+        *_spin(data, time),
         *_saturation(data, time),
         *_given_up(data, time),
     ]
@@ -201,6 +204,42 @@ def _switches(data: FlightData, time: Array, scores: Mapping[str, Any]) -> Itera
             yield Event(float(time[at]), "switch", f"{name}: {values[at - 1]:g} to {values[at]:g}{more}")
 
 
+def turning(data: FlightData) -> Array:
+    """How fast the body turns in rad/s, shape (records,); empty where that was not recorded.
+
+    Parameters
+    ----------
+    data : FlightData
+    """
+    if "body_rates" not in data:
+        return np.empty(0)
+    rate: Array = np.linalg.norm(np.asarray(data["body_rates"].values, dtype=float), axis=1)
+    return np.nan_to_num(rate)
+
+
+def spins(data: FlightData) -> bool:
+    """Whether the body makes a whole turn at more than one a second, about whatever axis.
+
+    Parameters
+    ----------
+    data : FlightData
+    """
+    return any(True for _ in _spin(data, np.asarray(data["time"].values, dtype=float)))
+
+
+def _spin(data: FlightData, time: Array) -> Iterator[Event]:
+    """When the body begins to turn faster than once a second, and how fast it turns then at most."""
+    rate = turning(data)
+    found = []
+    for span in _spans(time, rate > SPIN) if rate.size else []:
+        within = rate[(time >= span.start - 1e-9) & (time <= span.end + 1e-9)]
+        if within.mean() * (span.end - span.start) >= TURN:  # a swerve is no spin
+            found.append((span, float(within.max()) / TURN))
+    for (span, most), more in _first(found):
+        text = f"spins for {_seconds(span.end - span.start)}, up to {most:.2g} turns a second{more}"
+        yield Event(span.start, "spin", text)
+
+
 def _saturation(data: FlightData, time: Array) -> Iterator[Event]:
     """Rotors at a limit of their commands."""
     if "thrust_command" not in data or "thrust_max" not in data.attrs:
@@ -238,9 +277,12 @@ def _given_up(data: FlightData, time: Array) -> Iterator[Event]:
 
 
 def _span_text(span: Span) -> str:
-    seconds = span.end - span.start
-    length = f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+    length = _seconds(span.end - span.start)
     return f"on and off for {length}" if span.broken else f"for {length}"
+
+
+def _seconds(length: float) -> str:
+    return f"{1e3 * length:.0f} ms" if length < 1.0 else f"{length:.3g} s"
 
 
 def _spans(time: Array, where: NDArray[np.bool_]) -> list[Span]:
