@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from rotorfault.flight.fly import fly, fly_all, repeat
     from rotorfault.flight.many import Flights, fly_many
     from rotorfault.flight.view import view
+    from rotorfault.logs.api import diagnose
+    from rotorfault.logs.verdict import LogDiagnosis
     from rotorfault.maths.geometry import Mat3, PerRotor, Vec3
     from rotorfault.maths.rotation import Quat
     from rotorfault.model.block import Context, Nothing
@@ -111,6 +113,7 @@ _HOME = {
     "Frame": "model.frames",
     "Ground": "plant.ground",
     "InputError": "base.errors",
+    "LogDiagnosis": "logs.verdict",
     "Mat3": "maths.geometry",
     "Nothing": "model.block",
     "NullSpace": "analysis.null_space",
@@ -154,6 +157,7 @@ _HOME = {
     "export_vehicle": "model.importers.vehicles",
     "fly": "flight.fly",
     "fly_all": "flight.fly",
+    "diagnose": "logs.api",
     "fly_many": "flight.many",
     "frame_names": "model.frames",
     "hover_margin": "analysis.hover",
@@ -209,6 +213,7 @@ __all__ = [
     "Frame",
     "Ground",
     "InputError",
+    "LogDiagnosis",
     "Mat3",
     "Nothing",
     "NullSpace",
@@ -250,6 +255,7 @@ __all__ = [
     "critical_loss_with",
     "critical_pair",
     "critical_thrust_to_weight",
+    "diagnose",
     "export_vehicle",
     "fly",
     "fly_all",

@@ -17,7 +17,7 @@ BELIEF = ("autopilot",)
 # A command of the command line loads what it runs when it is called, so that `--help` and `list` cost nothing.
 COMMANDS = tuple(
     f"rotorfault.cli.{name}"
-    for name in ("campaign", "convert", "export", "fly", "frames", "look", "new", "studies", "tune")
+    for name in ("campaign", "convert", "diagnose", "export", "fly", "frames", "look", "new", "studies", "tune")
 )
 XARRAY = "xarray takes longer to load than a flight takes to fly"
 MATPLOTLIB = "matplotlib takes a second to load"

@@ -77,6 +77,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
         "Single flights, many at once, and what comes back.",
         ["fly", "fly_all", "repeat", "load", "Flight", "fly_many", "Flights", "compare", "Comparison", "view"],
     ),
+    "logs": ("Flight logs", "Which rotor, in a log of somebody's flight.", ["diagnose", "LogDiagnosis"]),
     "campaigns": ("Campaigns", "Maps of thousands of flights.", ["campaign", "Campaign"]),
     "before": (
         "Before a flight",

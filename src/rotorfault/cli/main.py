@@ -12,11 +12,24 @@ from typing import Any
 from rotorfault.base import interrupts
 from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
-from rotorfault.cli import campaign, convert, export, fly, frames, look, new, studies, tune
+from rotorfault.cli import campaign, convert, diagnose, export, fly, frames, look, new, studies, tune
 from rotorfault.cli.app import STOPPED, app, say
 from rotorfault.cli.usage import USAGE, refusal
 
-__all__ = ["app", "campaign", "convert", "export", "fly", "frames", "look", "main", "new", "studies", "tune"]
+__all__ = [
+    "app",
+    "campaign",
+    "convert",
+    "diagnose",
+    "export",
+    "fly",
+    "frames",
+    "look",
+    "main",
+    "new",
+    "studies",
+    "tune",
+]
 
 NARROWEST = 20  # columns of a terminal: below, tables have no room for a word
 # What the system says where there is no memory left for a thread or a library.

@@ -1,0 +1,182 @@
+"""ArduPilot's dataflash logs as one record.
+
+What the motors were asked for is rebuilt from ``RATE.ROut``, ``POut``, ``YOut`` and ``AOut``; ``RCOU`` is what was
+sent, as pulses that ``MOT_*`` turn into thrust. ``SERVOn_FUNCTION`` 33 to 40 are motors 1 to 8.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rotorfault.logs.commands import mixed, share_of_pulse
+from rotorfault.logs.dataflash import DataflashFile, read_dataflash
+from rotorfault.logs.log import Damage, Layout, Log, Note, Series, named_layout
+from rotorfault.maths.arrays import Array
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.rotation import Quat
+from rotorfault.model.importers.ardupilot import BY_NUMBERS
+from rotorfault.model.thrust_curve import share_of
+
+WANTED = dict.fromkeys(("RCOU", "ATT", "RATE", "IMU", "XKF1", "NKF1", "BAT", "CURR", "ESC", "CTUN", "XKF2", "NKF2"))
+FLIP = np.array([1.0, -1.0, -1.0])
+FIRST_MOTOR = 33  # SERVOn_FUNCTION of motor 1
+
+
+def read_ardupilot_log(path: Path) -> Log:
+    """A dataflash log as a `Log`.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be opened.
+    """
+    file = read_dataflash(path, WANTED)
+    remarks: list[str] = []
+    layout = _layout(file)
+    if layout is not None and layout.assumed:
+        remarks.append(f"motor places are assumed: {layout.source}")
+    series = {**_motion(file), **_commands(file, layout, remarks), **_power(file, layout)}
+    for message in file.messages.values():
+        if message.rows.every > 1:
+            remarks.append(f"{message.name}: one of {message.rows.every} records is used, the log being long")
+    damage = Damage(file.lost, file.reason)
+    notes = tuple(_note(time * 1e-6, text) for time, text in file.texts)
+    return Log(path.name, "ArduPilot dataflash", layout, series, file.parameters, notes, damage, tuple(remarks))
+
+
+def _note(time: float, text: str) -> Note:
+    match = re.search(r"Potential Thrust Loss \((\d+)\)", text)
+    return Note(time, text, match is not None, int(match[1][:3]) if match else None)
+
+
+def _series(
+    file: DataflashFile, name: str, fields: Sequence[str], scale: Array | float = 1.0, index: str = ""
+) -> Series | None:
+    """Some fields of a message; of those that have several instances, the first."""
+    message = file.messages.get(name)
+    if message is None or not len(message.rows):
+        return None
+    table = message.rows.table()
+    names = table.dtype.names or ()
+    if "TimeUS" not in names or any(f not in names or table.dtype[f].kind not in "fiu" for f in fields):
+        return None
+    if index in names and table.dtype[index].kind in "iu":
+        table = table[table[index] == table[index].min()]
+    with np.errstate(invalid="ignore"):
+        values = np.column_stack([table[f].astype(float) * message.scale.get(f, 1.0) for f in fields]) * scale
+    return Series(table["TimeUS"].astype(float) * 1e-6, values)
+
+
+def _motion(file: DataflashFile) -> dict[str, Series]:
+    degrees = np.radians(1.0)
+    found = {
+        "rates": _series(file, "IMU", ("GyrX", "GyrY", "GyrZ"), FLIP, "I")
+        or _series(file, "RATE", ("R", "P", "Y"), FLIP * degrees),
+        "specific_force": _series(file, "IMU", ("AccX", "AccY", "AccZ"), FLIP, "I"),
+    }
+    for name in ("XKF1", "NKF1"):
+        found.setdefault("velocity", _series(file, name, ("VN", "VE", "VD"), FLIP, "C"))
+        found.setdefault("position", _series(file, name, ("PN", "PE", "PD"), FLIP, "C"))
+        if found["velocity"] is None:
+            found.pop("velocity")
+            found.pop("position")
+    angles = _series(file, "ATT", ("Roll", "Pitch", "Yaw"), FLIP * degrees)
+    if angles is not None:
+        found["attitude"] = Series(angles.time, quaternions(angles.values))
+    for name in ("XKF2", "NKF2"):
+        found.setdefault("wind", _series(file, name, ("VWN", "VWE"), np.array([1.0, -1.0]), "C"))
+        if found["wind"] is None:
+            found.pop("wind")
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def quaternions(angles: Array) -> Array:
+    """Quaternions, scalar first, of roll, pitch and yaw.
+
+    Parameters
+    ----------
+    angles : (n, 3) ndarray, rad
+        Roll, pitch, yaw.
+    """
+    q = Quat.from_euler(Vec3(*angles.T))
+    return np.column_stack([q.w, q.x, q.y, q.z])
+
+
+def _layout(file: DataflashFile) -> Layout | None:
+    kind, type_ = file.parameters.get("FRAME_CLASS"), file.parameters.get("FRAME_TYPE", 1.0)
+    if kind is None or not np.isfinite([kind, type_]).all():
+        return named_layout("quad-x", "ArduPilot's quad X; the log names no frame", assumed=True)
+    frame = BY_NUMBERS.get((int(kind), int(type_)))
+    return None if frame is None else named_layout(frame, f"FRAME_CLASS {kind:.0f}, FRAME_TYPE {type_:.0f}")
+
+
+def _commands(file: DataflashFile, layout: Layout | None, remarks: list[str]) -> dict[str, Series]:
+    found: dict[str, Series] = {}
+    if layout is None:
+        return found
+    asked = _series(file, "RATE", ("ROut", "POut", "YOut", "AOut"))
+    output = _output(file, len(layout.places))
+    if output is not None:
+        found["output"] = output
+    if asked is not None:
+        values = asked.values
+        found["command"] = Series(asked.time, mixed(layout, values[:, :3] * FLIP, values[:, 3], "ardupilot"))
+        remarks.append("commands are rebuilt from RATE.ROut, POut, YOut, AOut")
+    elif output is not None:
+        found["command"] = output
+        remarks.append("commands are those of RCOU")
+    return found
+
+
+def _output(file: DataflashFile, count: int) -> Series | None:
+    parameters = file.parameters
+    channels = {
+        int(value) - FIRST_MOTOR: number
+        for number in range(1, 15)
+        if FIRST_MOTOR <= (value := parameters.get(f"SERVO{number}_FUNCTION", 0.0)) < FIRST_MOTOR + 8
+    }
+    if not channels:
+        channels = {k: k + 1 for k in range(count)}
+    if any(k not in channels for k in range(count)):
+        return None
+    pulses = _series(file, "RCOU", [f"C{channels[k]}" for k in range(count)])
+    if pulses is None:
+        return None
+    low, high = parameters.get("MOT_PWM_MIN", 1000.0) or 1000.0, parameters.get("MOT_PWM_MAX", 2000.0) or 2000.0
+    least, most = parameters.get("MOT_SPIN_MIN", 0.15), parameters.get("MOT_SPIN_MAX", 0.95)
+    expo = parameters.get("MOT_THST_EXPO", 0.65)
+    if not (np.isfinite([low, high, least, most, expo]).all() and most > least and abs(expo) <= 1.0):
+        return None
+    signal = np.clip((share_of_pulse(pulses.values, low, high) - least) / (most - least), 0.0, 1.0)
+    return Series(pulses.time, share_of(signal, expo))
+
+
+def _power(file: DataflashFile, layout: Layout | None) -> dict[str, Series]:
+    found: dict[str, Series] = {}
+    battery = _series(file, "BAT", ("Volt", "Curr"), index="Instance") or _series(file, "CURR", ("Volt", "Curr"))
+    if battery is not None:
+        found["battery"] = battery
+    message = file.messages.get("ESC")
+    if message is None or layout is None:
+        return found
+    table = message.rows.table()
+    names = table.dtype.names or ()
+    if not {"TimeUS", "Instance", "RPM", "Curr"} <= set(names):
+        return found
+    for field, name in (("RPM", "rpm"), ("Curr", "current")):
+        each = [table[table["Instance"] == k] for k in range(len(layout.places))]
+        if all(len(rows) > 1 for rows in each):
+            time = each[0]["TimeUS"].astype(float) * 1e-6
+            columns = [
+                np.interp(time, rows["TimeUS"].astype(float) * 1e-6, rows[field].astype(float)) for rows in each
+            ]
+            found[name] = Series(time, np.column_stack(columns))
+    return found

@@ -1,0 +1,216 @@
+r"""When a rotor lost its thrust: a test of the residual, block by block, against each rotor and each loss.
+
+The residual less its mean over the last 20 s is taken as noise that follows itself, :math:`e_k = \rho_k - \varphi
+\rho_{k-1}`, with tails of Student's t. For each rotor and loss the logarithm of the ratio of likelihoods adds up from
+the onset that makes it greatest:
+
+.. math:: S_k = \max(S_{k-1} + \ell_k,\ \ell^{onset}_k)
+
+An alarm is a sum above :math:`h = \ln(10\,h / block)`: without a fault a sum of such ratios, restarted at each block,
+passes h once in :math:`e^h` blocks at most, so once in ten hours of independent blocks. The noise, its tails and its
+memory are measured in the log itself.
+
+Source: M. Basseville, I. V. Nikiforov, *Detection of Abrupt Changes*, 1993, sections 2.2 and 2.4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rotorfault.logs.dynamics import Residual
+from rotorfault.maths.arrays import Array
+
+HOURS = 10.0  # between false alarms that are accepted
+LOSSES = np.array([0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
+TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis beyond any normal one
+REFERENCE, GUARD = 20.0, 1.0  # s whose mean a residual is weighed against, and s between them
+FIRST = 3.0  # s at least before anything is said
+SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
+EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
+HOLD = 5.0  # s over which evidence is gathered
+UPSET = 1.2  # rad of tilt, beyond which the model of hover ends
+
+
+class Scan(NamedTuple):
+    """What the test found in one flight."""
+
+    time: Array  # (n,) s, end of each block
+    evidence: Array  # (n, N) greatest sum of each rotor over its losses
+    residual: Array  # (n, 4) less its reference, NaN where there is none
+    spread: Array  # (4,) of the innovations
+    memory: Array  # (4,) share of a residual that remains a block later
+    threshold: float
+    onset: float | None  # s, of what has the most evidence, alarm or not
+    rotor: int | None  # index
+    loss: float
+    alarm: float | None  # s, when the sum passed the threshold
+    scores: Array  # (N,) of each rotor where the evidence is strongest, averaged over losses
+    free: float  # the same of a push in any direction
+
+
+def threshold_of(block: float) -> float:
+    """The sum that is an alarm.
+
+    Parameters
+    ----------
+    block : float, s
+    """
+    return math.log(HOURS * 3600.0 / block)
+
+
+def referenced(values: Array, block: float) -> Array:
+    """Residuals less the median of those before; NaN where there are too few.
+
+    Parameters
+    ----------
+    values : (n, 4) ndarray
+    block : float, s
+    """
+    guard, first, width = int(GUARD / block) + 1, int(FIRST / block), int(REFERENCE / block)
+    out = np.full_like(values, np.nan)
+    every = max(1, int(0.5 / block))
+    for begin in range(first, len(values), every):
+        before = values[max(0, begin - guard - width) : max(begin - guard, 2)]
+        with np.errstate(all="ignore"):
+            good = np.isfinite(before).any(axis=0)
+            level = np.full(values.shape[1], np.nan)
+            if good.any():
+                level[good] = np.nanmedian(before[:, good], axis=0)
+        out[begin : begin + every] = values[begin : begin + every] - level
+    return out
+
+
+def scan(residual: Residual, stop: float | None = None) -> Scan:
+    """Test a flight.
+
+    Parameters
+    ----------
+    residual : Residual
+    stop : float, optional, s
+        Where the vehicle is upset, and nothing later counts.
+    """
+    rho = referenced(residual.values, residual.block)
+    count, motors = len(rho), residual.command.shape[1]
+    memory, spread = _noise(rho)
+    threshold = threshold_of(residual.block)
+    shapes = -LOSSES[:, None, None] * residual.patterns.T[None]  # losses, rotors, axes
+    sums = np.full((len(LOSSES), motors), -np.inf)
+    onsets = np.zeros((len(LOSSES), motors), dtype=int)
+    evidence = np.zeros((count, motors))
+    hold = int(HOLD / residual.block)
+    alarm: int | None = None
+    best: tuple[int, Array, Array] | None = None
+    strongest = 0.0
+    previous, signal_before = np.full(4, np.nan), np.zeros((len(LOSSES), motors, 4))
+    last = count if stop is None else int(np.searchsorted(residual.time, stop))
+    for k in range(last):
+        now, doubt = rho[k], residual.doubt[k]
+        usable = np.isfinite(now) & np.isfinite(previous) & np.isfinite(doubt)
+        signal = shapes * residual.command[k][None, :, None]
+        if usable.any():
+            scale = np.sqrt(spread**2 + doubt**2)[usable]
+            plain = ((now - memory * previous)[usable]) / scale
+            onset_ratio = _ratio(plain, signal[:, :, usable] / scale)
+            kept = (signal - memory * signal_before)[:, :, usable] / scale
+            carried = sums + _ratio(plain, kept)
+            fresh = (onset_ratio > carried) | (k - onsets > hold)
+            sums = np.where(fresh, onset_ratio, carried)
+            onsets = np.where(fresh, k, onsets)
+        evidence[k] = np.maximum(sums.max(axis=0), 0.0)
+        previous, signal_before = now, signal
+        if alarm is None and evidence[k].max() > threshold:
+            alarm = k
+        # An alarm is explained by the most that is known of it within a second.
+        near = alarm is not None and k - alarm <= int(EXPLAINED / residual.block)
+        if (alarm is None or near) and evidence[k].max() > strongest:
+            strongest, best = float(evidence[k].max()), (k, sums.copy(), onsets.copy())
+    time = residual.time + residual.block
+    said = Scan(time, evidence, rho, spread, memory, threshold, None, None, 0.0, None, np.zeros(motors), 0.0)
+    if best is None:
+        return said
+    k, sums, onsets = best
+    loss, rotor = np.unravel_index(int(np.argmax(sums)), sums.shape)
+    begin = int(onsets[loss, rotor])
+    free = _free_shift(rho[begin : k + 1], residual.doubt[begin : k + 1], memory, spread, residual.response.hover)
+    average = np.log(np.mean(np.exp(np.minimum(sums, 700.0)), axis=0) + 1e-300)
+    return said._replace(
+        onset=float(residual.time[begin]),
+        rotor=int(rotor),
+        loss=_settled_loss(residual, rho, begin, int(rotor)) or _mean_loss(sums[:, rotor]),
+        alarm=None if alarm is None else float(time[alarm]),
+        scores=average,
+        free=free,
+    )
+
+
+def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> float | None:
+    """The loss by what the commands settle at, where the flight goes on calmly: there no gain matters."""
+    first, last = begin + int(SETTLED / residual.block), begin + int(HOLD / residual.block)
+    after = slice(first, min(last, len(rho)))
+    command, axes = residual.command[after], residual.patterns[:3]
+    turn = residual.values[after, :3] + command @ axes.T
+    calm = (command.max(axis=1, initial=0.0) < 0.97) & (np.abs(turn).max(axis=1, initial=0.0) < CALM)
+    if calm.sum() < SETTLED / residual.block or calm.mean() < 0.8:
+        return None
+    shape = axes[:, rotor]
+    mean = np.nanmedian(rho[after][calm][:, :3], axis=0)
+    loss = -float(mean @ shape) / float(shape @ shape) / float(np.median(command[calm, rotor]))
+    return min(max(loss, 0.01), 1.0)
+
+
+def _mean_loss(sums: Array) -> float:
+    """Mean of the losses by what speaks for each."""
+    weights = np.exp(sums - sums.max())
+    return float(weights @ LOSSES / weights.sum())
+
+
+def _free_shift(rho: Array, doubt: Array, memory: Array, spread: Array, hover: float) -> float:
+    """What speaks for a lasting push from outside in any direction, in place of a rotor.
+
+    Its size about each axis is averaged over a normal distribution, of wind and a shifted load: a tenth of the
+    command in hover, half of that in yaw.
+    """
+    sizes = np.linspace(-4.0, 4.0, 161)
+    weights = np.exp(-0.5 * sizes**2)
+    weights /= weights.sum()
+    before = np.vstack([np.zeros((1, rho.shape[1])), rho[:-1]])
+    total = 0.0
+    for axis, sd in enumerate(np.array([0.4, 0.4, 0.2, 0.1]) * hover):  # of sums over four motors, and of their mean
+        usable = np.isfinite(rho[:, axis]) & np.isfinite(before[:, axis]) & np.isfinite(doubt[:, axis])
+        if not usable.any():
+            continue
+        scale = np.sqrt(spread[axis] ** 2 + doubt[usable, axis] ** 2)
+        noise = (rho[usable, axis] - memory[axis] * before[usable, axis]) / scale
+        gone = np.where(np.arange(len(rho))[usable] == 0, 1.0, 1.0 - memory[axis])
+        shift = sizes[:, None] * sd * (gone / scale)[None]
+        ratio = _ratio(noise[None, :, None], shift[:, :, None]).sum(axis=1)
+        most = ratio.max()
+        total += most + math.log(float(weights @ np.exp(ratio - most)))
+    return total
+
+
+def _ratio(noise: Array, signal: Array) -> Array:
+    """Logarithm of the likelihood with a signal over that without, summed over axes; both over the spread."""
+    half = 0.5 * (TAIL + 1.0)
+    with_it = np.log1p((noise - signal) ** 2 / TAIL)
+    ratio: Array = half * (np.log1p(noise**2 / TAIL) - with_it).sum(axis=-1)
+    return ratio
+
+
+def _noise(rho: Array) -> tuple[Array, Array]:
+    """How much of each residual remains a block later, and the spread of what is new."""
+    memory, spread = np.zeros(4), np.full(4, 1.0)
+    for axis in range(4):
+        x = rho[:, axis]
+        x = x[np.isfinite(x)]
+        if len(x) < 20:
+            continue
+        limit = 4.0 * 1.4826 * np.median(np.abs(x)) + 1e-9
+        x = np.clip(x, -limit, limit)
+        memory[axis] = min(max(float((x[1:] * x[:-1]).sum() / max((x**2).sum(), 1e-18)), 0.0), 0.95)
+        new = x[1:] - memory[axis] * x[:-1]
+        spread[axis] = max(1.4826 * float(np.median(np.abs(new))), 2e-3)
+    return memory, spread

@@ -1,0 +1,162 @@
+"""The words of a diagnosis: evidence of each cause, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorfault.logs.log import Log
+from rotorfault.logs.scan import Scan
+from rotorfault.logs.trim import Evidence, Trim
+from rotorfault.logs.verdict import Cause, likely
+
+
+def when(log: Log, time: float) -> str:
+    """A time of the log's clock, and where in the log it is.
+
+    Parameters
+    ----------
+    log : Log
+    time : float, s
+    """
+    into = time - log.start
+    return f"t = {time:.2f} s" + (f" ({into:.2f} s into the log)" if log.start > 0.5 else "")
+
+
+def rotor_words(log: Log, rotor: int) -> str:
+    """A rotor with its place.
+
+    Parameters
+    ----------
+    log : Log
+    rotor : int
+        Its number, from 1.
+    """
+    place = "" if log.layout is None else f" ({log.layout.names[rotor - 1]})"
+    return f"rotor {rotor}{place}"
+
+
+def sudden_evidence(log: Log, scan: Scan, rotor: int) -> str:
+    """What a test of motion says of a rotor.
+
+    Parameters
+    ----------
+    log : Log
+    scan : Scan
+    rotor : int
+        Its index.
+    """
+    odds = f"evidence {scan.scores[rotor]:.1f} of {scan.threshold:.1f} that are an alarm, in logarithms of likelihood"
+    if rotor != scan.rotor or scan.onset is None:
+        return odds
+    said = [f"the body turned as if it pulled less from {when(log, scan.onset)}", odds]
+    if scan.alarm is not None:
+        said.append(f"certain {max(scan.alarm - scan.onset, 0.0):.2f} s later")
+    output, command = log.series.get("output"), log.series.get("command")
+    if output is not None and command is not None and scan.onset is not None:
+        window = (output.time > scan.onset + 0.2) & (output.time < scan.onset + 1.0)
+        if window.sum() >= 3:
+            short = (command.at(output.time[window]) - output.values[window]).mean(axis=0)
+            if short[rotor] > 0.15 and short[rotor] == short.max():
+                said.append("what was sent to it is less than what was asked for: its output was forced or limited")
+    return "; ".join(said)
+
+
+def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim | None, known: bool) -> str:
+    """What hover says of a cause.
+
+    Parameters
+    ----------
+    name : str
+        Of the cause.
+    rotor : int or None
+        Index, where it is a rotor.
+    evidence : Evidence
+    trim : Trim or None
+    known : bool
+        Whether there is a baseline.
+    """
+    against = "its baseline" if known else "an even share"
+    if rotor is not None:
+        others = np.delete(evidence.deviation, rotor)
+        return (
+            f"in hover it is asked for {evidence.deviation[rotor]:+.0%} ({evidence.sigmas[rotor]:+.1f} sigma of "
+            f"{against}), the others for {others.min():+.0%} to {others.max():+.0%}"
+        )
+    if name == "healthy":
+        most = int(np.argmax(np.abs(evidence.sigmas)))
+        return f"no motor is off {against} by more than {abs(evidence.sigmas[most]):.1f} sigma (motor {most + 1})"
+    share = evidence.explained.get(name)
+    said = "" if share is None else f"would explain {share:.0%} of the change of trim"
+    if name == "battery sag" and trim is not None and np.isfinite(trim.voltage):
+        said += f"; {trim.voltage:.2f} V in hover"
+    if name == "wind":
+        tilt = None if trim is None or not np.isfinite(trim.tilt).all() else trim.tilt
+        size = None if tilt is None else np.degrees(np.hypot(*tilt))
+        said += "; attitude is not logged" if size is None else f"; leans by {size:.1f} deg in hover"
+    return said
+
+
+def own_words(log: Log) -> tuple[str, ...]:
+    """What the flight software itself said of motors.
+
+    Parameters
+    ----------
+    log : Log
+    """
+    said = [f"{when(log, note.time)}: {note.text}" for note in log.notes if note.alarm]
+    return tuple(said[:10])
+
+
+def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> str:
+    """The diagnosis in a sentence.
+
+    Parameters
+    ----------
+    log : Log
+    causes : sequence of Cause
+        By probability.
+    evidence : Evidence or None
+        Of hover.
+    """
+    first = causes[0]
+    how = f"({likely(first.probability)}, {_percent(first.probability)})"
+    if first.cause == "healthy":
+        said = f"no rotor is at fault {how}"
+        second = next((one for one in causes[1:] if one.rotor is not None), None)
+        if second is not None and second.probability >= 0.02:
+            said += f"; {rotor_words(log, second.rotor or 1)} cannot be excluded ({_percent(second.probability)})"
+        return said
+    if first.rotor is None:
+        word = (
+            f"{first.cause} rather than a rotor"
+            if first.onset is None
+            else f"{first.cause} since {when(log, first.onset)}"
+        )
+        return f"{word} {how}{_rest(log, causes, None)}"
+    may = "" if first.probability >= 0.75 else " may have"
+    lost = "lost thrust" if first.loss is None else f"lost about {first.loss:.0%}"
+    since = f"from {when(log, first.onset)}" if first.onset is not None else "from the beginning of the log"
+    return f"{rotor_words(log, first.rotor)}{may} {lost} {since} {how}{_rest(log, causes, evidence)}"
+
+
+def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> str:
+    """What else would explain a part of it, and what cannot be excluded."""
+    said = ""
+    if evidence is not None and causes[0].onset is None:
+        for name in ("wind", "centre of mass shifted"):
+            share = evidence.explained.get(name, 0.0)
+            if share >= 0.1:
+                word = "wind" if name == "wind" else "a shifted centre of mass"
+                said += f"; {word} would explain {share:.0%} of it"
+    doubts = [one for one in causes[1:] if one.probability >= 0.05][:2]
+    for one in doubts:
+        name = rotor_words(log, one.rotor) if one.rotor is not None else one.cause
+        name = "a sound vehicle" if name == "healthy" else name
+        said += f"; {name} cannot be excluded ({_percent(one.probability)})"
+    return said
+
+
+def _percent(probability: float) -> str:
+    return "> 99 %" if probability > 0.99 else f"{100.0 * probability:.0f} %"
