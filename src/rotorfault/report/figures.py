@@ -7,6 +7,7 @@ global settings and backend are left alone.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -92,7 +93,9 @@ def save(figures: Mapping[str, Figure], folder: str | Path, formats: Sequence[st
             raise InputError(f"figure format {name!r}; allowed: {', '.join(FORMATS)}")
     folder = output_folder(Path(folder))
     paths = []
-    with rc_context(STYLE):
+    with rc_context(STYLE), warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box, which says as much.
+        warnings.filterwarnings("ignore", message="Glyph")
         for name, figure in figures.items():
             engine = figure.get_layout_engine()
             if engine is not None:
