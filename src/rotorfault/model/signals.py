@@ -210,6 +210,7 @@ class _Diagnosis(NamedTuple):
     residual: PerRotor  # N: estimated thrust less the thrust that a healthy rotor would give
     test: PerRotor  # N: least thrust of a sound rotor to command, to see whether it gives any
     stuck: Stuck  # rotors that do not follow; their loss is the share that is missing at this instant
+    probability: PerRotor  # that a rotor is at fault
 
 
 class Diagnosis(_Diagnosis):
@@ -229,6 +230,8 @@ class Diagnosis(_Diagnosis):
         Least thrust of a sound rotor to command, to see whether it gives any; none if not given.
     stuck : Stuck, optional
         Rotors that do not follow; none if not given. Their loss is the share that is missing at this instant.
+    probability : PerRotor, optional
+        Probability that a rotor is at fault, 0 to 1; the flags if not given.
     """
 
     __slots__ = ()
@@ -241,6 +244,7 @@ class Diagnosis(_Diagnosis):
         residual: PerRotor,
         test: PerRotor | None = None,
         stuck: Stuck | None = None,
+        probability: PerRotor | None = None,
     ) -> Diagnosis:
         """What is not said of tests and stuck rotors is that there are none."""
         count = len(loss) if isinstance(loss, PerRotor) else 0  # what it is made of is checked where it is used
@@ -252,6 +256,7 @@ class Diagnosis(_Diagnosis):
             residual,
             PerRotor.all(0.0, count) if test is None else test,
             following(count) if stuck is None else stuck,
+            flagged if probability is None else probability,
         )
 
     def __repr__(self) -> str:

@@ -47,11 +47,10 @@ from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.scalar import Scalar, exp, maximum, sqrt
 from rotorfault.model.block import Context, Nothing, Record, TimeGrid
 from rotorfault.model.slot import register
+from rotorfault.model.turbulence import FOOT, turbulence
 from rotorfault.plant.timed import TimeInputs
 from rotorfault.plant.wind import Air, Wind
 from rotorfault.plant.wind_in_space import InSpace, SpaceNumbers, air_at, space_numbers, too_short, varies
-
-FOOT = 0.3048  # m
 
 
 class DrydenParameters(NamedTuple):
@@ -143,17 +142,16 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
         s = self.settings
         x, y, _ = s.velocity_W
         level = math.hypot(x, y)
-        shape = 0.177 + 0.000823 * s.altitude / FOOT
-        sigma_up = 0.1 * s.wind_at_6m
+        gusts = turbulence(s.wind_at_6m, s.altitude)
         return DrydenParameters(
             velocity_W=Vec3.of(s.velocity_W),
             airspeed_min=s.airspeed_min,
             along_x=x / level if level > 0.0 else 1.0,
             along_y=y / level if level > 0.0 else 0.0,
-            sigma_level=sigma_up / shape**0.4,
-            sigma_up=sigma_up,
-            length_level=s.altitude / shape**1.2,
-            length_up=s.altitude,
+            sigma_level=gusts.sigma_level,
+            sigma_up=gusts.sigma_up,
+            length_level=gusts.length_level,
+            length_up=gusts.length_up,
             period=context.period,
             space=space_numbers(s),
         )

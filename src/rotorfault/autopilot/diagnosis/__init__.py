@@ -3,9 +3,10 @@
 Importing the package registers every source of diagnosis, so that the registry is complete.
 """
 
+from rotorfault.autopilot.diagnosis.glr import Glr
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger
 from rotorfault.autopilot.diagnosis.off import Off
 from rotorfault.autopilot.diagnosis.oracle import Delayed, Present
 from rotorfault.autopilot.diagnosis.protocol import DIAGNOSIS, Diagnoser, DiagnosisInputs, Oracle
 
-__all__ = ["DIAGNOSIS", "Delayed", "Diagnoser", "DiagnosisInputs", "Luenberger", "Off", "Oracle", "Present"]
+__all__ = ["DIAGNOSIS", "Delayed", "Diagnoser", "DiagnosisInputs", "Glr", "Luenberger", "Off", "Oracle", "Present"]

@@ -147,23 +147,14 @@ def follow(
     dynamics : Dynamics
     """
     elapsed, kept = expectation.elapsed, 1.0 - dynamics.gain_rate
-    entering = limited(vehicle, command)
-    ahead = entering * vehicle.rotor_gain - expectation.thrust
-    bandwidth = vehicle.rotor_bandwidth
-    if not isinstance(vehicle.rotor_bandwidth_down, tuple):
-        bandwidth = lag_bandwidth(vehicle, expectation.thrust / vehicle.rotor_gain, entering)
-    lag = memory.lag * dynamics.lag_decay + ahead * (bandwidth * elapsed)
+    lag = lag_sensitivity(memory.lag, expectation, command, vehicle, dynamics.lag_decay)
 
     lag_innovation = memory.lag_innovation * kept + (lag - memory.lagging) * elapsed
     turned = expectation.now.omega_B - expectation.previous.omega_B
     turn_innovation = memory.turn_innovation * kept + turned - memory.turning * elapsed
     x, y, z = expectation.now.omega_B
     product_innovation = memory.product_innovation * kept + (Vec3(y * z, z * x, x * y) - memory.product) * elapsed
-    # A rotor that runs ahead of its model has also turned the body further the other way. Its speed is a root of its
-    # thrust, so the difference is that of a share as large as bandwidths are wrong by.
-    ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
-    ran_ahead = _about_z(residual_speed(vehicle, ahead_of_model) - expectation.residual_speed)
-    reaction = -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
+    reaction = reaction_sensitivity(lag, expectation, vehicle)
     # On a vehicle without a reaction, which is known before the flight, nothing is remembered of it, and it is free.
     there = less(0.0, vehicle.rotor_reaction)
     before, reacting = memory.reaction * there, memory.reacting * there
@@ -190,6 +181,53 @@ def follow(
         time=time,
         noise=memory.noise + (squared - memory.noise) * share,
     )
+
+
+def lag_sensitivity(
+    lag: PerRotor, expectation: Expectation, command: PerRotor, vehicle: Vehicle, decay: Scalar
+) -> PerRotor:
+    """Sensitivity in N of the thrusts to the logarithm of the bandwidth, one period later.
+
+    Parameters
+    ----------
+    lag : PerRotor, N
+        Of the instant before.
+    expectation : Expectation
+        Of the period.
+    command : PerRotor, N
+        Held over it.
+    vehicle : Vehicle
+        As believed.
+    decay : scalar
+        What remains of a rotor's lag over one period.
+    """
+    entering = limited(vehicle, command)
+    ahead = entering * vehicle.rotor_gain - expectation.thrust
+    bandwidth = vehicle.rotor_bandwidth
+    if not isinstance(vehicle.rotor_bandwidth_down, tuple):
+        bandwidth = lag_bandwidth(vehicle, expectation.thrust / vehicle.rotor_gain, entering)
+    after: PerRotor = lag * decay + ahead * (bandwidth * expectation.elapsed)
+    return after
+
+
+def reaction_sensitivity(lag: PerRotor, expectation: Expectation, vehicle: Vehicle) -> Scalar:
+    """Sensitivity in rad/s of the yaw rate to the logarithm of the bandwidth, by the rotors' reaction.
+
+    A rotor that runs ahead of its model has also turned the body further the other way. Its speed is a root of its
+    thrust, so the difference is that of a share as large as bandwidths are wrong by.
+
+    Parameters
+    ----------
+    lag : PerRotor, N
+        From `lag_sensitivity`.
+    expectation : Expectation
+        Of the period.
+    vehicle : Vehicle
+        As believed.
+    """
+    ahead_of_model = rotor_speeds(vehicle, expectation.thrust + lag * SPEED_SHARE)
+    ran_ahead = _about_z(residual_speed(vehicle, ahead_of_model) - expectation.residual_speed)
+    return -rate_against_rotors(vehicle, ran_ahead) / SPEED_SHARE
 
 
 def _about_z(residual: Scalar | Vec3) -> Scalar:

@@ -1,0 +1,340 @@
+r"""What moves a body whose rotors are sound: the model that faults have to beat.
+
+Wind and a wrong model compete with the rotors for the same evidence, so they are states of one filter, each with a
+spread of its own at the start. Angular acceleration and specific force along body z are, to first order,
+
+.. math:: \dot\omega = \alpha + \tfrac{T}{mg}\,d + \varphi_J\,e_J + \varphi_w e_w + \varphi_l\,l
+                       - \sum_i\lambda_i F_i J^{-1}b_i, \qquad
+          f_z = \tfrac{T}{m}(1 - e_m) + f_{air,z} - \sum_i\lambda_i F_i \tfrac{n_i}{m}
+
+with :math:`\alpha` and T of the believed model with sound rotors, and
+
+- d, torque over inertia of a shifted centre of mass and of unlike drag torques;
+- :math:`e_J`, by which share each moment of inertia is larger than believed, :math:`\varphi_J = -\dot\omega`, and
+  :math:`e_w`, the rotors' bandwidth, :math:`\varphi_w = J^{-1}\tau(s)` with the sensitivities s of
+  `rotorfault.autopilot.diagnosis.model_error`: constants, which a flight that turns the body teaches;
+- l, the levers about roll and pitch at which lateral forces of the air act: drag above the centre of mass, and
+  flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the air's specific force f. So what grows with airspeed
+  belongs to the air;
+- a, force of the wind over mass in world axes, a random walk, which the accelerometer measures on all axes, with the
+  drag of the own way, :math:`f = R^T(a - \tfrac{k_d}mv)`; :math:`e_m`, the share of mass and battery;
+- :math:`\lambda_i`, the losses, each taken to last. They are 0, with no variance, where no fault is believed.
+
+The wind's force walks with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of
+standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle to
+the other, b away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque. What
+is constant but for slow changes walks over its whole spread in ten minutes.
+
+What first-order terms leave out enters as noise: squares of the shares (:math:`e_J^2\dot\omega`,
+:math:`\tfrac12e_w^2 s`), and the products of the rates, which a wrong inertia turns into torque; each lasts about as
+long as a rotor's lag, so its variance times twice that time is the density.
+
+The noise of the gyroscope is its own, and what vibrates: the variance of the measurement follows the innovations,
+
+.. math:: R \leftarrow \max\big(R + \tfrac T{\tau_R}(\min(\nu^2, 9S) - S),\; R_{sensor}\big)
+
+which is at rest where innovations have the variance S that the filter expects. One innovation changes it by no more
+than nine expected ones, so a fault does not make a noise of itself before it is found.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pydantic import Field
+
+from rotorfault.autopilot.diagnosis.kalman import Belief, Innovation, Sparse, diagonal, dot, follow, innovation, predict
+from rotorfault.autopilot.diagnosis.model_error import lag_sensitivity, reaction_sensitivity
+from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
+from rotorfault.autopilot.prediction import reaction
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, clip, less, maximum, minimum, select
+from rotorfault.model.block import Context
+from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
+from rotorfault.model.turbulence import turbulence
+from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
+
+RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
+"""Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
+
+NOISE_MEMORY = 0.5  # s: time constant of the measured noise; many periods, and few of a flight
+OUTLIER = 9.0  # expected squares that one innovation may count for: three standard deviations
+ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
+BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
+# s: in which a battery weakens the rotors by as much as their mass is uncertain, and a load, or the shape that the air
+# meets, moves by as much as its place is.
+SLOW = 600.0
+STILL = 1.0  # m/s: least wind that carries gusts past
+
+
+class ModelSettings(Strict):
+    """How wrong the believed vehicle may be, and what the air and the sensors do: standard deviations."""
+
+    mass: float = Field(default=0.1, ge=0.0, description="share by which mass or battery may be wrong")
+    inertia: float = Field(default=0.2, ge=0.0, description="share by which moments of inertia may be wrong")
+    bandwidth: float = Field(default=0.3, ge=0.0, description="share by which the rotors' bandwidth may be wrong")
+    centre_of_mass: float = Field(default=0.01, ge=0.0, description="how far the centre of mass may be shifted [m]")
+    torque_ratio: float = Field(default=0.1, ge=0.0, description="share by which drag torques may be wrong")
+    lever: float = Field(
+        default=0.2, ge=0.0, description="lever of the air's lateral force, over the arms of the rotors"
+    )
+    wind: float = Field(default=8.0, ge=0.0, description="mean wind at 6 m whose gusts are expected [m/s]")
+    gyroscope: float = Field(default=0.002, gt=0.0, description="least noise of the rates at an instant [rad/s]")
+    accelerometer: float = Field(
+        default=0.5, gt=0.0, description="least noise of the specific force at an instant [m/s^2]"
+    )
+
+
+class ModelParameters(NamedTuple):
+    """Numbers of the model."""
+
+    start: tuple[Scalar, ...]  # variances of the states behind the rates
+    walk: tuple[Scalar, ...]  # variances by which they grow per second
+    gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
+    drag: Scalar  # 1/s: drag over airspeed and mass
+    inertia: Scalar  # share
+    bandwidth: Scalar  # share
+    lag_decay: Scalar  # what remains of a rotor's lag over one period
+    lag: Scalar  # s: of the rotors
+    gyroscope: Scalar  # rad^2/s^2: least variance
+    accelerometer: Scalar  # m^2/s^4: least variance
+
+
+class ModelMemory(NamedTuple):
+    """The state and what goes with it."""
+
+    belief: Belief
+    lag: PerRotor  # N: sensitivity of the thrusts to the logarithm of the bandwidth
+    reaction: Scalar  # rad/s: of the yaw rate, by the rotors' reaction
+    noise: Vec3  # rad^2/s^2: variance of the measured rates
+    force_noise: Vec3  # m^2/s^4: variance of the measured specific force
+
+
+class Step(NamedTuple):
+    """What one sampling instant did to the state, for who follows a hypothesis beside it."""
+
+    rows: dict[int, Sparse]  # of Phi - I
+    torque: tuple[tuple[Scalar, ...], ...]  # rad/s: by which a whole loss of each rotor changes the rates
+    force: tuple[Scalar, ...]  # m/s^2: by which it changes the specific force
+    seen: tuple[tuple[Sparse, Innovation], ...]  # rates about x, y, z, and specific force along them, in this order
+
+
+def model_parameters(settings: ModelSettings, context: Context) -> ModelParameters:
+    """Numbers of the settings, for a vehicle.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+    context : Context
+        With the believed vehicle.
+    """
+    vehicle, s = context.vehicle, settings
+    weight = vehicle.mass * vehicle.gravity
+    J = vehicle.inertia
+    drag = air_drag(vehicle)
+    arms = math.sqrt(sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors)
+    lever = s.lever * arms
+    gusts = turbulence(s.wind, ALTITUDE)
+    level = 2.0 * gusts.sigma_level**2 * s.wind / gusts.length_level
+    up = 2.0 * gusts.sigma_up**2 * s.wind / gusts.length_up
+    yaw = s.torque_ratio * mean_of(vehicle.torque_ratio) * 0.5 * weight
+    tilt = s.centre_of_mass * weight
+    offsets = ((tilt / J.x) ** 2, (tilt / J.y) ** 2, (yaw / J.z) ** 2)
+    over = drag / vehicle.mass
+    along = (over * s.wind) ** 2 + (over * gusts.sigma_level) ** 2
+    blows = (along, along, (over * gusts.sigma_up) ** 2)
+    mass, inertia, bandwidth = s.mass**2, s.inertia**2, s.bandwidth**2
+    constants = (*offsets, inertia, inertia, inertia, bandwidth, lever**2, lever**2)
+    w = mean_bandwidth(vehicle)
+    return ModelParameters(
+        start=(*constants, *blows, mass),
+        walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SLOW),
+        gradient=Vec3(*(_gradient(s, drag, arms) / (j * j) for j in J)),
+        drag=over,
+        inertia=s.inertia,
+        bandwidth=s.bandwidth,
+        lag_decay=math.exp(-w * context.period),
+        lag=1.0 / w,
+        gyroscope=s.gyroscope**2,
+        accelerometer=s.accelerometer**2,
+    )
+
+
+def _gradient(settings: ModelSettings, drag: float, arms: float) -> float:
+    """Density in (N m)^2 s of the torque of gusts that differ from one side of the vehicle to the other."""
+    gusts, across = turbulence(settings.wind, ALTITUDE), 2.0 * arms
+    torque = 0.5 * drag * arms
+    both = (gusts.sigma_up**2 / gusts.length_up, gusts.sigma_level**2 / gusts.length_level)
+    return max(2.0 * across * share for share in both) * torque**2 * 2.0 * across / max(settings.wind, STILL)
+
+
+def air_drag(vehicle: Vehicle) -> float:
+    """Drag over airspeed in N s/m in hover: linear drag, and that of the rotors."""
+    drag = float(vehicle.linear_drag)
+    if vehicle.air != ():
+        speeds = rotor_speeds(vehicle, hover_thrust(vehicle))
+        drag += float(vehicle.air.rotor_drag * speeds.sum())  # type: ignore[union-attr]
+    return drag
+
+
+def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemory:
+    """Before anything is seen.
+
+    Parameters
+    ----------
+    inputs : DiagnosisInputs
+        Of the first instant.
+    parameters : ModelParameters
+    """
+    p, rotors = parameters, inputs.vehicle.rotors
+    none = PerRotor.all(0.0, rotors)
+    known = (0.0,) * rotors
+    belief = diagonal(
+        (*inputs.estimate.omega_B, *(0.0,) * len(p.start), *known),
+        (*(p.gyroscope,) * 3, *p.start, *known),
+    )
+    return ModelMemory(belief, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
+
+
+def advance(
+    memory: ModelMemory,
+    inputs: DiagnosisInputs,
+    parameters: ModelParameters,
+    drift: PerRotor,
+    stuck: PerRotor,
+) -> tuple[ModelMemory, Step]:
+    """One sampling instant.
+
+    Parameters
+    ----------
+    memory : ModelMemory
+    inputs : DiagnosisInputs
+    parameters : ModelParameters
+    drift : PerRotor, 1/s
+        Variance by which each loss grows per second; 0 where it is known to be 0.
+    stuck : PerRotor
+        1 where a rotor is believed not to follow, nor to change its speed.
+    """
+    p, e, vehicle = parameters, inputs.expectation, inputs.vehicle
+    dt, belief, mean = e.elapsed, memory.belief, memory.belief.mean
+    thrust = e.mean_thrust
+    wrench = wrench_of(vehicle, thrust)
+    omega_B = (e.previous.omega_B + e.now.omega_B) * 0.5
+    turning = torque_of_motion(vehicle, omega_B, e.residual_speed)
+    if vehicle.air != ():
+        turning = turning + torque_of_turning(vehicle, omega_B, e.speed)
+    turn = over_inertia(vehicle, wrench.torque_B + turning)
+
+    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, p.lag_decay)
+    left = 1.0 - believed_losses(belief, vehicle.rotors)
+    lagging = over_inertia(vehicle, wrench_of(vehicle, (memory.lag + lag) * 0.5 * left).torque_B)
+    reacting = reaction_sensitivity(lag, e, vehicle)
+    reacted = Vec3(0.0, 0.0, reacting - memory.reaction)
+    torque = tuple(_loss_torques(vehicle, thrust, dt))
+    level_W = inputs.estimate.q_WB.matrix().T.rows
+    # Force of the air over mass: drag of the own way, and what the wind adds.
+    air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
+    lever = _lever_rows(vehicle, air_W.dot(level_W[0]), air_W.dot(level_W[1]))
+    weigh = wrench.thrust / (vehicle.mass * vehicle.gravity)
+
+    rows: dict[int, Sparse] = {}
+    noise: dict[int, Scalar] = {}
+    wrong = _second_order(vehicle, omega_B, lagging, turn, p)
+    for axis, name in enumerate("xyz"):
+        row = {
+            OFFSETS + axis: weigh * dt,
+            BANDWIDTH: getattr(lagging, name) * dt + getattr(reacted, name),
+            **({LEVERS + axis: lever[axis] * dt} if axis < 2 else {}),
+            **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
+        }
+        # Of what turns the body in all, a wrong inertia is wrong by a share.
+        row[INERTIA + axis] = -(getattr(turn, name) * dt + dot(row, mean))
+        rows[RATES + axis] = row
+        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt
+    noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
+    noise |= {LOSSES + i: drifts * dt for i, drifts in enumerate(drift)}
+    change = turn * dt + reaction(e, vehicle, stuck)
+    belief = predict(belief, rows, {RATES + axis: value for axis, value in enumerate(change)}, noise)
+
+    seen: list[tuple[Sparse, Innovation]] = []
+    variances: list[Scalar] = []
+    for axis, (measured, variance) in enumerate(zip(inputs.estimate.omega_B, memory.noise, strict=True)):
+        row = {RATES + axis: 1.0}
+        one = innovation(belief, row, measured, variance)
+        belief = follow(belief, one)
+        seen.append((row, one))
+        variances.append(_noise_after(variance, one, p.gyroscope, dt))
+
+    force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
+    lifts = _lifts(vehicle, e.thrust)
+    felt_B, own_W = inputs.estimate.specific_force_B, inputs.estimate.v_W * p.drag
+    # A body that feels nothing at all has no accelerometer.
+    blind = select(less(0.0, felt_B.dot(felt_B)), 0.0, BLIND)
+    variances_of_force: list[Scalar] = []
+    for axis, (felt, lift, variance) in enumerate(zip(felt_B, lifts, memory.force_noise, strict=True)):
+        row = {WIND + k: component for k, component in enumerate(level_W[axis])}
+        if axis == 2:
+            row |= {MASS: -lift, **{LOSSES + i: value for i, value in enumerate(force)}}
+        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]), variance + blind)
+        belief = follow(belief, one)
+        seen.append((row, one))
+        variances_of_force.append(_noise_after(variance, one, p.accelerometer, dt))
+
+    after = ModelMemory(belief, lag, reacting, Vec3.of(variances), Vec3.of(variances_of_force))
+    return after, Step(rows, torque, force, tuple(seen))
+
+
+def _lifts(vehicle: Vehicle, thrust: PerRotor) -> Vec3:
+    """Specific force in m/s^2 of the rotors along the body axes."""
+    lift = wrench_of(vehicle, thrust).thrust / vehicle.mass
+    if vehicle.tilt == ():
+        return Vec3(0.0, 0.0, lift)
+    side = lateral_force(vehicle, thrust) / vehicle.mass
+    return Vec3(side.x, side.y, lift)
+
+
+def _loss_torques(vehicle: Vehicle, thrust: PerRotor, dt: Scalar) -> list[tuple[Scalar, Scalar, Scalar]]:
+    """By what in rad/s the rates change over a period if each rotor gives nothing."""
+    matrix = effectiveness(vehicle)
+    columns = zip(matrix.roll, matrix.pitch, matrix.yaw, strict=True)
+    turns = (over_inertia(vehicle, Vec3(*column)) for column in columns)
+    return [tuple(-f * dt * g for g in turn) for f, turn in zip(thrust, turns, strict=True)]  # type: ignore[misc]
+
+
+def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar, Scalar]:
+    """Angular accelerations in rad/s^2 about roll and pitch by the air's lateral force over mass, at a lever of 1 m."""
+    m, J = vehicle.mass, vehicle.inertia
+    return -left * (m / J.x), forward * (m / J.y)
+
+
+def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, turn: Vec3, p: ModelParameters) -> Vec3:
+    """Density in rad^2/s^3 of what the first order leaves out."""
+    J = vehicle.inertia
+    others = Vec3(J.y + J.z, J.z + J.x, J.x + J.y)
+    products = Vec3(omega_B.y * omega_B.z, omega_B.z * omega_B.x, omega_B.x * omega_B.y)
+    spun = products.times(others).over(J) * p.inertia
+    lagged = lagging * (0.5 * p.bandwidth * p.bandwidth)
+    turned = turn * (p.inertia * p.inertia)
+    squares = (a * a + b * b + c * c for a, b, c in zip(spun, lagged, turned, strict=True))
+    return Vec3(*(2.0 * p.lag * square for square in squares))
+
+
+def _noise_after(variance: Scalar, seen: Innovation, least: Scalar, dt: Scalar) -> Scalar:
+    """Variance of a measured number after one more."""
+    size = minimum(seen.value * seen.value, OUTLIER * seen.variance)
+    return maximum(variance + (size - seen.variance) * (dt / NOISE_MEMORY), least)
+
+
+def believed_losses(belief: Belief, rotors: int) -> PerRotor:
+    """The losses as estimated, 0 to 1.
+
+    Parameters
+    ----------
+    belief : Belief
+    rotors : int
+    """
+    return PerRotor.of(clip(x, 0.0, 1.0) for x in belief.mean[LOSSES : LOSSES + rotors])

@@ -1,0 +1,182 @@
+r"""Generalised likelihood ratio: which rotor's loss, since when, beats wind and a wrong model.
+
+The filter of `rotorfault.autopilot.diagnosis.fault_free` explains the motion by sound rotors, wind and a wrong model;
+the windows of `rotorfault.autopilot.diagnosis.jumps` say how far the loss of a rotor stands out. A rotor is flagged
+where that is by the threshold b for the wanted ``false_alarms`` per hour
+(`rotorfault.autopilot.diagnosis.alarm_rate`), and no other rotor explains it nearly as well: with
+:math:`\ln\Lambda_i = \tfrac12\max(z_i, 0)^2` and :math:`\ln A = \tfrac12b^2` in
+`rotorfault.autopilot.diagnosis.verdict`.
+
+A loss that is found becomes a state of the filter, which goes on to follow it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple, final
+
+from pydantic import Field
+
+from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
+from rotorfault.autopilot.diagnosis.alarm_rate import windows_threshold
+from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters, ModelSettings
+from rotorfault.autopilot.diagnosis.kalman import Belief
+from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+from rotorfault.base.config import Strict
+from rotorfault.maths.geometry import PerRotor
+from rotorfault.maths.scalar import Scalar, clip, maximum
+from rotorfault.model.block import Context, Record
+from rotorfault.model.signals import Diagnosis
+from rotorfault.model.slot import register
+from rotorfault.model.telemetry import NO_FRAME, Q
+
+
+class GlrSettings(Strict):
+    """What counts as a fault, how often a sound rotor may be blamed, and what is not known of the vehicle."""
+
+    false_alarms: float = Field(default=0.1, gt=0.0, le=3600.0, description="false alarms per hour that are borne")
+    least: float = Field(default=0.05, ge=0.0, lt=1.0, description="loss up to which a rotor counts as sound")
+    drift: float = Field(default=0.5, ge=0.0, description="by which a believed loss may change, in a second [1/s^0.5]")
+    persistence: float = Field(default=0.008, ge=0.0, description="time at its threshold before a rotor is flagged [s]")
+    clear_persistence: float = Field(
+        default=0.2, gt=0.0, description="time for which a flagged rotor must seem sound [s]"
+    )
+    model: ModelSettings = Field(default=ModelSettings(), description="what is not known of vehicle, air and sensors")
+
+
+class GlrParameters(NamedTuple):
+    """Numbers of the detector."""
+
+    model: ModelParameters
+    length: tuple[Scalar, ...]  # s: of the windows
+    threshold: Scalar  # standard deviations
+    least: Scalar
+    drift: Scalar  # 1/s
+    persistence: Scalar  # s
+    clear_persistence: Scalar  # s
+
+
+class GlrSignals(NamedTuple):
+    """What the detector records."""
+
+    probability: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a rotor is at fault")]
+    statistic: Annotated[PerRotor, Q("1", NO_FRAME, "standard deviations by which its loss stands out")]
+    threshold: Annotated[Scalar, Q("1", NO_FRAME, "those at which it is flagged")]
+
+
+class GlrMemory(NamedTuple):
+    """Filter, windows and flags."""
+
+    model: ModelMemory
+    windows: jumps.Windows
+    verdict: verdict.VerdictMemory
+
+
+@final
+@register("glr")
+class Glr(Diagnoser[GlrMemory, GlrParameters]):
+    """Likelihood ratios of losses against wind and model error, with a wanted rate of false alarms."""
+
+    Settings = GlrSettings
+    Telemetry = GlrSignals
+
+    def parameters(self, context: Context) -> GlrParameters:
+        """Spreads, windows and threshold."""
+        s = self.settings
+        length = jumps.lengths(context.period)
+        threshold = windows_threshold(s.false_alarms, context.vehicle.rotors, length, context.period)
+        model = fault_free.model_parameters(s.model, context)
+        return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence)
+
+    def initial(self, inputs: DiagnosisInputs, parameters: GlrParameters) -> GlrMemory:
+        """Nothing is known yet."""
+        model, rotors = fault_free.at_start(inputs, parameters.model), inputs.vehicle.rotors
+        windows = jumps.nothing_seen(len(model.belief.mean), rotors)
+        return GlrMemory(model, windows, verdict.nobody(rotors))
+
+    def step(
+        self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: GlrParameters, dt: Scalar
+    ) -> tuple[GlrMemory, Diagnosis, Record]:
+        """One sampling instant."""
+        p, rotors, flagged = parameters, inputs.vehicle.rotors, memory.verdict.flagged
+        none = PerRotor.all(0.0, rotors)
+        model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none)
+        windows = jumps.watch(memory.windows, p.length, step, dt)
+        found = jumps.best(windows, p.least)
+        evidence = found.excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
+        fresh = verdict.probabilities(evidence, 0.5 * p.threshold * p.threshold, flagged)
+        flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
+        belief = jumps.believe(model.belief, windows, found, new)
+        windows = jumps.begun_anew(windows, 1.0 - new.sum())
+
+        flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
+        after = GlrMemory(model._replace(belief=belief), windows, flags)
+        return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, p.threshold)
+
+
+def conclude(
+    memory: verdict.VerdictMemory,
+    belief: Belief,
+    new: PerRotor,
+    fresh: PerRotor,
+    found: jumps.Best,
+    inputs: DiagnosisInputs,
+    parameters: GlrParameters,
+    dt: Scalar,
+) -> tuple[verdict.VerdictMemory, Diagnosis, Belief]:
+    """Flags, the diagnosis that they make, and the filter's state without the losses of those taken back.
+
+    Parameters
+    ----------
+    memory : VerdictMemory
+    belief : Belief
+        With new losses in it.
+    new : PerRotor
+        1 where a flag is raised now.
+    fresh : PerRotor
+        Probability of a new fault.
+    found : Best
+        What windows say of rotors that are not flagged.
+    inputs : DiagnosisInputs
+    parameters : GlrParameters
+    dt : scalar, s
+        Sampling period.
+    """
+    p, rotors = parameters, inputs.vehicle.rotors
+    mean = PerRotor.of(belief.mean[LOSSES : LOSSES + rotors])
+    variance = PerRotor.of(belief.of(LOSSES + i, LOSSES + i) for i in range(rotors))
+    still = verdict.still_faulty(mean, variance, p.least)
+    flags, cleared = verdict.held(memory, new, still, p.clear_persistence, dt)
+    belief = forgotten(belief, cleared)
+    flagged = flags.flagged
+    estimate = flagged.map(lambda on, a, b: clip(on * a + (1.0 - on) * b, 0.0, 1.0), mean, found.loss)
+    probability = flagged.map(lambda on, a, b: on * a + (1.0 - on) * b, still, fresh)
+    residual = -(estimate * inputs.expectation.thrust)
+    return flags, Diagnosis(estimate * flagged, flagged, estimate, residual, probability=probability), belief
+
+
+def forgotten(belief: Belief, cleared: PerRotor) -> Belief:
+    """A state without the losses of rotors that are sound again.
+
+    Parameters
+    ----------
+    belief : Belief
+    cleared : PerRotor
+        1 for those.
+    """
+    n, count = len(belief.mean), len(cleared)
+    kept: list[Scalar] = [1.0] * n
+    for i, off in enumerate(cleared):
+        kept[LOSSES + i] = 1.0 - off
+    first = n - count
+    mean = tuple(x * kept[i] if i >= first else x for i, x in enumerate(belief.mean))
+    rows = []
+    for i, row in enumerate(belief.covariance):
+        line = []
+        for k, value in enumerate(row):
+            # The last states alone can be forgotten.
+            both = [kept[j] for j in {i, i + k} if j >= first]
+            for factor in both:
+                value = value * factor
+            line.append(value)
+        rows.append(tuple(line))
+    return Belief(mean, tuple(rows))

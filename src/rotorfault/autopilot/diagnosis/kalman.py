@@ -1,0 +1,137 @@
+r"""A Kalman filter on scalars, for a state of which only a few elements move by themselves.
+
+.. math:: \bar x = \Phi\hat x + u, \quad \bar P = \Phi P\Phi^T + Q, \qquad
+          S = h\bar Ph^T + R, \quad K = \bar Ph^T/S, \quad \hat x = \bar x + K\nu, \quad P = \bar P - KSK^T
+
+with one number measured at a time, :math:`\nu = y - h\bar x`, so that nothing has to be inverted; numbers measured
+together must have independent noise. Rows of :math:`\Phi - I` and h are sparse: they name the elements that count.
+Only the upper triangle of P is kept, so it stays symmetric.
+
+Source: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82, 1960; one number
+at a time: D. Simon, "Optimal State Estimation", 2006, section 6.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from rotorfault.maths.scalar import Scalar
+
+Sparse = Mapping[int, Scalar]
+"""Elements of a row that are not zero, by their place."""
+
+
+class Belief(NamedTuple):
+    """Mean and covariance of a state."""
+
+    mean: tuple[Scalar, ...]
+    covariance: tuple[tuple[Scalar, ...], ...]  # row i from the diagonal on: elements i, i + 1, ...
+
+    def of(self, i: int, j: int) -> Scalar:
+        """An element of the covariance."""
+        return self.covariance[i][j - i] if i <= j else self.covariance[j][i - j]
+
+
+def diagonal(mean: Sequence[Scalar], variances: Sequence[Scalar]) -> Belief:
+    """Elements that are known independently of each other.
+
+    Parameters
+    ----------
+    mean, variances : sequence of scalar
+    """
+    n = len(mean)
+    rows = (tuple(variances[i] if i == j else 0.0 for j in range(i, n)) for i in range(n))
+    return Belief(tuple(mean), tuple(rows))
+
+
+def dot(row: Sparse, values: Sequence[Scalar]) -> Scalar:
+    """A sparse row times a vector."""
+    total: Scalar = 0.0
+    for k, factor in row.items():
+        total = total + factor * values[k]
+    return total
+
+
+def predict(belief: Belief, rows: Mapping[int, Sparse], known: Mapping[int, Scalar], noise: Sparse) -> Belief:
+    """One period further.
+
+    Parameters
+    ----------
+    belief : Belief
+    rows : mapping of int to Sparse
+        What an element changes by, for each that moves: a row of Phi - I.
+    known : mapping of int to scalar
+        What is added to an element besides.
+    noise : Sparse
+        Variance that is added to an element.
+    """
+    n = len(belief.mean)
+    moved = {i: [dot(row, [belief.of(k, j) for k in range(n)]) for j in range(n)] for i, row in rows.items()}
+    covariance: list[tuple[Scalar, ...]] = []
+    for i in range(n):
+        line = []
+        for j in range(i, n):
+            value = belief.of(i, j)
+            if i in moved:
+                value = value + moved[i][j]
+            if j in moved:
+                value = value + moved[j][i]
+            if i in moved and j in moved:
+                value = value + dot(rows[j], moved[i])
+            if i == j and i in noise:
+                value = value + noise[i]
+            line.append(value)
+        covariance.append(tuple(line))
+    mean = list(belief.mean)
+    for i, row in rows.items():
+        mean[i] = mean[i] + dot(row, belief.mean)
+    for i, added in known.items():
+        mean[i] = mean[i] + added
+    return Belief(tuple(mean), tuple(covariance))
+
+
+class Innovation(NamedTuple):
+    """What one measured number says."""
+
+    value: Scalar  # measured less expected
+    variance: Scalar  # of it
+    gain: tuple[Scalar, ...]  # by which each element of the state follows it
+
+
+def innovation(belief: Belief, row: Sparse, measured: Scalar, noise: Scalar) -> Innovation:
+    """What a measured number says of the state.
+
+    Parameters
+    ----------
+    belief : Belief
+    row : Sparse
+        What is measured of the state, h.
+    measured : scalar
+    noise : scalar
+        Its variance.
+    """
+    n = len(belief.mean)
+    reach = [dot(row, [belief.of(k, j) for k in range(n)]) for j in range(n)]
+    variance = dot(row, reach) + noise
+    over = 1.0 / variance
+    return Innovation(measured - dot(row, belief.mean), variance, tuple(r * over for r in reach))
+
+
+def follow(belief: Belief, seen: Innovation) -> Belief:
+    """The state after a measured number.
+
+    Parameters
+    ----------
+    belief : Belief
+    seen : Innovation
+    """
+    n, gain = len(belief.mean), seen.gain
+    scaled = [g * seen.variance for g in gain]
+    mean = tuple(x + g * seen.value for x, g in zip(belief.mean, gain, strict=True))
+    rows = (
+        tuple(value - gain[i] * scaled[i + k] for k, value in enumerate(row))
+        for i, row in enumerate(belief.covariance)
+    )
+    assert n == len(gain)
+    return Belief(mean, tuple(rows))
