@@ -60,6 +60,8 @@ def name_of(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+DETECTORS = "detectors.md"  # sources of diagnosis that are not the paper's have a page of their own
+
 every_page = pytest.mark.parametrize("path", PAGES, ids=name_of)
 
 
@@ -114,7 +116,9 @@ def test_tables_are_those_of_the_code(path: Path) -> None:
 
 @pytest.mark.parametrize(("slot", "kind"), PARTS)
 def test_every_part_has_a_section_with_all_its_settings(slot: str, kind: str) -> None:
-    text = section(PAGE_OF[slot], kind, f"{SLOTS[slot].group}/{kind}")
+    table = f"{SLOTS[slot].group}/{kind}"
+    page = DETECTORS if f"<!-- table: {table} -->" in TEXT[DOCS / DETECTORS] else PAGE_OF[slot]
+    text = section(page, kind, table)
     for setting in TOOL.settings(SLOTS[slot].registry[kind].Settings):
         assert f"`{setting.key}`" in text
 
@@ -181,14 +185,15 @@ def test_signals_are_those_of_flights() -> None:
     lines = (TABLES["signals"] + TABLES["signals/parts"]).splitlines()
     rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
     seen = set()
-    for kind in CONTROLLER.registry:
-        settings = {"duration": 0.002, "controller.kind": kind, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
+    common = {"duration": 0.002, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
+    for slot, kind in [(slot, kind) for slot in ("controller", "diagnosis") for kind in SLOTS[slot].registry]:
+        settings = {**common, f"{slot}.kind": kind}
         data = rf.fly("land-after-fault", settings=settings, engine="python").data
         for name, variable in data.data_vars.items():
             _, _, dims, unit, _, recorded, meaning, _ = rows[str(name)]
             assert dims == ", ".join(map(str, variable.dims[1:]))
             assert (unit or "1", meaning) == (variable.attrs["units"], variable.attrs["long_name"])
-            if str(name).startswith("controller."):
+            if str(name).startswith(f"{slot}."):
                 assert recorded == "all" or f"`{kind}`" in recorded
             seen.add(str(name))
     seen |= {signal.name for signal in signals_of(TiltSignals)}  # tests/flight/test_tilted_flight.py flies with them

@@ -38,6 +38,7 @@ CHILDREN: dict[str, list[str]] = {
         "explanations/truth-and-belief",
         "controllers/index",
         "diagnosis",
+        "detectors",
         "allocation",
         "attainable",
         "total-loss",

@@ -137,7 +137,7 @@ def test_no_part_of_an_ordinary_autopilot_gets_the_truth(kind: str, monkeypatch:
 def test_inputs_of_a_source_have_no_place_for_the_truth(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not even those of an oracle: it is told by an argument of `told` that no other source has."""
     seen = at_the_onset(monkeypatch, diagnosis=kind, fault=faults(0.25, 0.35))["diagnosis"]
-    assert {name.partition(".")[0] for name in seen} == {"estimate", "expectation", "command", "vehicle"}
+    assert {name.partition(".")[0] for name in seen} == {"estimate", "expectation", "command", "vehicle", "readings"}
     assert not [name for name in seen if "loss" in name or "true" in name]
     assert not {0.25, 0.35} & set(seen.values())
 

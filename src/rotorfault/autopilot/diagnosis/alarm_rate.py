@@ -4,11 +4,11 @@ r"""Thresholds for a wanted rate of false alarms, from the statistics of what is
 over the root of it. In :math:`\ln C` that is a stationary process with the correlation
 :math:`e^{-|\Delta\ln C|/2}`, which exceeds b while :math:`\ln C` grows by U with a probability of
 
-.. math:: p(b) \le Q(b) + \tfrac12\,U\,b\,\varphi(b)
+.. math:: p(b) \approx \varphi(b)\left(\tfrac12\left(b - \tfrac1b\right)U + \tfrac2b\right)
 
-(:math:`\varphi`, Q: density and upper tail of the standard normal distribution). A torque that lasts shows in rates of
-white noise by an information that grows as the cube of time, so an onset that grows older by the factor n has
-:math:`U = 3\ln n`. The bound is that of continuous time, where the highest value between two instants counts too.
+(:math:`\varphi`: density of the standard normal distribution). A torque that lasts shows in rates
+of white noise by an information that grows as the cube of time, so an onset that grows older by the factor n has
+:math:`U = 3\ln n`. It is that of continuous time, where the highest value between two instants counts too.
 Windows that take an onset every :math:`D_m` for N rotors alarm, by the union bound, at most
 :math:`\sum_m N\,p_m(b)/D_m` times a second.
 
@@ -19,8 +19,8 @@ the filter's time :math:`t_c`; N of them cross b upwards :math:`N\,b\,\varphi(b)
 without a fault. So the mean time to the first alarm at a level A is at least A times the time between two onsets,
 whatever the distribution (Shiryaev, Roberts; Pollak).
 
-Sources: D. Siegmund, "Sequential Analysis", 1985; S. O. Rice, Bell Syst. Tech. J. 24,
-1945; M. Pollak, Ann. Statist. 13, 1985.
+Sources: R. Miller, D. Siegmund, Biometrics 38, 1982; S. O. Rice, Bell Syst. Tech. J. 24, 1945; M.
+Pollak, Ann. Statist. 13, 1985.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def density(b: float) -> float:
 
 
 def window_probability(b: float, older: float) -> float:
-    """Bound of the probability that z exceeds b while an onset grows older by a factor, with no fault."""
-    return tail(b) + 0.5 * STEEPNESS * math.log(older) * b * density(b)
+    """Probability that z exceeds b while an onset grows older by a factor, with no fault."""
+    return density(b) * (0.5 * (b - 1.0 / b) * STEEPNESS * math.log(older) + 2.0 / b)
 
 
 def windows_threshold(per_hour: float, rotors: int, lengths: Sequence[float], period: float) -> float:

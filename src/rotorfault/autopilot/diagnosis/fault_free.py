@@ -14,16 +14,16 @@ with :math:`\alpha` and T of the believed model with sound rotors, and
   :math:`e_w`, the rotors' bandwidth, :math:`\varphi_w = J^{-1}\tau(s)` with the sensitivities s of
   `rotorfault.autopilot.diagnosis.model_error`: constants, which a flight that turns the body teaches;
 - l, the levers about roll and pitch at which lateral forces of the air act: drag above the centre of mass, and
-  flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the air's specific force f. So what grows with airspeed
-  belongs to the air;
+  flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the air's specific force f. So what grows with
+  airspeed belongs to the air;
 - a, force of the wind over mass in world axes, a random walk, which the accelerometer measures on all axes, with the
   drag of the own way, :math:`f = R^T(a - \tfrac{k_d}mv)`; :math:`e_m`, the share of mass and battery;
 - :math:`\lambda_i`, the losses, each taken to last. They are 0, with no variance, where no fault is believed.
 
 The wind's force walks with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of
-standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle to
-the other, b away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque. What
-is constant but for slow changes walks over its whole spread in ten minutes.
+standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle
+to the other, b away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque.
+What is built walks over its whole spread in an hour, and the mass, for the battery, in ten minutes.
 
 What first-order terms leave out enters as noise: squares of the shares (:math:`e_J^2\dot\omega`,
 :math:`\tfrac12e_w^2 s`), and the products of the rates, which a wrong inertia turns into torque; each lasts about as
@@ -44,7 +44,16 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis.kalman import Belief, Innovation, Sparse, diagonal, dot, follow, innovation, predict
+from rotorfault.autopilot.diagnosis.kalman import (
+    Belief,
+    Innovation,
+    Sparse,
+    diagonal,
+    dot,
+    follow,
+    innovation,
+    predict,
+)
 from rotorfault.autopilot.diagnosis.model_error import lag_sensitivity, reaction_sensitivity
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
@@ -55,6 +64,7 @@ from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
+from rotorfault.model.sensor_model import SensorNoise
 from rotorfault.model.turbulence import turbulence
 from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
 
@@ -65,9 +75,8 @@ NOISE_MEMORY = 0.5  # s: time constant of the measured noise; many periods, and 
 OUTLIER = 9.0  # expected squares that one innovation may count for: three standard deviations
 ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
-# s: in which a battery weakens the rotors by as much as their mass is uncertain, and a load, or the shape that the air
-# meets, moves by as much as its place is.
-SLOW = 600.0
+SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
+SLOW = 3600.0  # s: in which what is built changes by as much as it is uncertain: some flights
 STILL = 1.0  # m/s: least wind that carries gusts past
 
 
@@ -83,9 +92,11 @@ class ModelSettings(Strict):
         default=0.2, ge=0.0, description="lever of the air's lateral force, over the arms of the rotors"
     )
     wind: float = Field(default=8.0, ge=0.0, description="mean wind at 6 m whose gusts are expected [m/s]")
-    gyroscope: float = Field(default=0.002, gt=0.0, description="least noise of the rates at an instant [rad/s]")
+    gyroscope: float = Field(
+        default=0.002, gt=0.0, description="noise of the rates at an instant, if the sensors say less [rad/s]"
+    )
     accelerometer: float = Field(
-        default=0.5, gt=0.0, description="least noise of the specific force at an instant [m/s^2]"
+        default=0.5, gt=0.0, description="noise of the specific force at an instant, if the sensors say less [m/s^2]"
     )
 
 
@@ -136,7 +147,9 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     weight = vehicle.mass * vehicle.gravity
     J = vehicle.inertia
     drag = air_drag(vehicle)
-    arms = math.sqrt(sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors)
+    arms = math.sqrt(
+        sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors
+    )
     lever = s.lever * arms
     gusts = turbulence(s.wind, ALTITUDE)
     level = 2.0 * gusts.sigma_level**2 * s.wind / gusts.length_level
@@ -152,16 +165,24 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     w = mean_bandwidth(vehicle)
     return ModelParameters(
         start=(*constants, *blows, mass),
-        walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SLOW),
+        walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG),
         gradient=Vec3(*(_gradient(s, drag, arms) / (j * j) for j in J)),
         drag=over,
         inertia=s.inertia,
         bandwidth=s.bandwidth,
         lag_decay=math.exp(-w * context.period),
         lag=1.0 / w,
-        gyroscope=s.gyroscope**2,
-        accelerometer=s.accelerometer**2,
+        gyroscope=_variance(context, "rates", s.gyroscope),
+        accelerometer=_variance(context, "specific_force", s.accelerometer),
     )
+
+
+def _variance(context: Context, sensor: str, least: float) -> float:
+    """Of a number as the sensors' record has it, vibration and all, or of a least noise."""
+    noise = getattr(context.sensors, sensor, ())
+    if not isinstance(noise, SensorNoise):
+        return least**2
+    return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration) ** 2, least**2)
 
 
 def _gradient(settings: ModelSettings, drag: float, arms: float) -> float:
@@ -302,11 +323,11 @@ def _loss_torques(vehicle: Vehicle, thrust: PerRotor, dt: Scalar) -> list[tuple[
     matrix = effectiveness(vehicle)
     columns = zip(matrix.roll, matrix.pitch, matrix.yaw, strict=True)
     turns = (over_inertia(vehicle, Vec3(*column)) for column in columns)
-    return [tuple(-f * dt * g for g in turn) for f, turn in zip(thrust, turns, strict=True)]  # type: ignore[misc]
+    return [tuple(-f * dt * g for g in turn) for f, turn in zip(thrust, turns, strict=True)]
 
 
 def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar, Scalar]:
-    """Angular accelerations in rad/s^2 about roll and pitch by the air's lateral force over mass, at a lever of 1 m."""
+    """Angular accelerations in rad/s^2 about roll and pitch by the air's lateral force, at a lever of 1 m."""
     m, J = vehicle.mass, vehicle.inertia
     return -left * (m / J.x), forward * (m / J.y)
 

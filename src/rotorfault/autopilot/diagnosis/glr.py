@@ -34,9 +34,13 @@ class GlrSettings(Strict):
     """What counts as a fault, how often a sound rotor may be blamed, and what is not known of the vehicle."""
 
     false_alarms: float = Field(default=0.1, gt=0.0, le=3600.0, description="false alarms per hour that are borne")
-    least: float = Field(default=0.05, ge=0.0, lt=1.0, description="loss up to which a rotor counts as sound")
-    drift: float = Field(default=0.5, ge=0.0, description="by which a believed loss may change, in a second [1/s^0.5]")
-    persistence: float = Field(default=0.008, ge=0.0, description="time at its threshold before a rotor is flagged [s]")
+    least: float = Field(default=0.03, ge=0.0, lt=1.0, description="loss up to which a rotor counts as sound")
+    drift: float = Field(
+        default=0.5, ge=0.0, description="by which a believed loss may change, in a second [1/s^0.5]"
+    )
+    persistence: float = Field(
+        default=0.008, ge=0.0, description="time at its threshold before a rotor is flagged [s]"
+    )
     clear_persistence: float = Field(
         default=0.2, gt=0.0, description="time for which a flagged rotor must seem sound [s]"
     )
@@ -60,7 +64,7 @@ class GlrSignals(NamedTuple):
 
     probability: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a rotor is at fault")]
     statistic: Annotated[PerRotor, Q("1", NO_FRAME, "standard deviations by which its loss stands out")]
-    threshold: Annotated[Scalar, Q("1", NO_FRAME, "those at which it is flagged")]
+    level: Annotated[Scalar, Q("1", NO_FRAME, "standard deviations at which one rotor alone is flagged")]
 
 
 class GlrMemory(NamedTuple):

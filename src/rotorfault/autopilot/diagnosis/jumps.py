@@ -14,9 +14,9 @@ Had rotor i lost the share :math:`\lambda` from an instant :math:`\theta` on, th
 A rotor that has lost ``least`` or less is nobody's fault. Beyond that the loss stands out by
 :math:`z = (\hat\lambda - least)\sqrt C` standard deviations.
 
-Onsets are watched by their age: window 0 begins anew every 4 ms; window k, twice as long as the one before, takes over
-what window k - 1 has seen so far when its own time is over. So at any time there is an onset of about every age, known
-the more finely the younger it is, and an onset is given up only when one of about its age is kept.
+Onsets are watched by their age: window 0 begins anew every 4 ms; window k, twice as long as the one before, takes
+over what window k - 1 has seen so far when its own time is over. So at any time there is an onset of about every age,
+known the more finely the younger it is, and an onset is given up only when one of about its age is kept.
 
 A jump that is believed is taken into the filter, as if it had known it from its onset on:
 
@@ -40,7 +40,7 @@ from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, greater_equal, maximum, select, sqrt
 
 SHORTEST = 0.004  # s: between two onsets; about as long as a measured jump of thrust is told from a gust
-DOUBLINGS = 9  # windows, each twice as long as the one before: up to 1.024 s
+DOUBLINGS = 10  # windows, each twice as long as the one before: up to 2.048 s
 TINY = 1e-12  # information below which nothing is known of a loss
 
 

@@ -9,9 +9,10 @@ and from which :math:`\ln\Lambda` on it would be wrong in healthy flight as ofte
 so that one rotor alone has :math:`p_1` where it reaches A, and of two that explain it alike neither does. A rotor is
 flagged once it has had :math:`p_1` or more for ``persistence``, so that no single measurement does it.
 
-A flagged rotor's loss is a state of the filter, :math:`\hat\lambda_i` with the variance :math:`P_i`; its probability is
-that it has lost more than ``least``, :math:`\Phi\big((\hat\lambda_i - least)/\sqrt{P_i}\big)`, with a logistic curve
-for :math:`\Phi` (within 0.01). The flag is taken back where that has stayed below `CLEAR` for ``clear_persistence``.
+A flagged rotor's loss is a state of the filter, :math:`\hat\lambda_i` with the variance :math:`P_i`; its probability
+is that it has lost more than ``least``, :math:`\Phi\big((\hat\lambda_i - least)/\sqrt{P_i}\big)`, with a logistic
+curve for :math:`\Phi` (within 0.01). The flag is taken back where that has stayed below `CLEAR` for
+``clear_persistence``.
 Between the two levels nothing changes, so nothing chatters.
 """
 
