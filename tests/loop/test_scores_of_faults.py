@@ -199,6 +199,7 @@ def test_numbers_of_a_landing() -> None:
     assert landing["distance"] == pytest.approx(np.hypot(*(p[touch] - p[hit])[:2]))
     up = 1.0 - 2.0 * (data["quaternion"].values[touch - 1, 1:3] ** 2).sum()
     assert landing["tilt"] == pytest.approx(np.arccos(up), abs=1e-7)
+    assert landing["yaw_rate"] == data["body_rates"].values[touch, 2] != 0.0
 
 
 def test_a_landing_without_a_fault_is_measured_from_where_it_began() -> None:

@@ -59,7 +59,7 @@ def test_a_landing_is_over_after_half_a_second_at_rest() -> None:
     assert summary["landing"] == pytest.approx(
         {
             "fault_time": 0.2, "confirmed_time": 0.3, "touch_down_time": 0.5, "rotors_stopped_time": 0.8,
-            "speed": 0.6, "horizontal_speed": 0.5, "tilt": 0.1, "distance": 0.5 * 0.3,
+            "speed": 0.6, "horizontal_speed": 0.5, "tilt": 0.1, "distance": 0.5 * 0.3, "yaw_rate": 0.0,
         }
     )  # fmt: skip
     assert math.isnan(summary["settle_time"]["overall"])

@@ -53,6 +53,7 @@ class Decision(NamedTuple):
     diagnosis: Diagnosis  # what is believed of the rotors
     stage: Scalar | tuple[()] = ()  # 0 as the scenario wants, 1 descending, 2 rotors stopped; empty if it never lands
     relief: Scalar | tuple[()] = ()  # share of every thrust that is taken back, 1 with rotors stopped; empty if none
+    spin: Scalar | tuple[()] = ()  # 1 where yaw is given up though it may be held; empty if that is never wanted
 
     def __repr__(self) -> str:
         return record_line(self)

@@ -48,6 +48,7 @@ def landing_after(
         speed=select(touches, -scores.velocity.z, old.speed),
         slide=select(touches, horizontal(scores.velocity), old.slide),
         cosine=select(touches, scores.attitude.z_axis().z, old.cosine),
+        yaw_rate=select(touches, signals.body_rates.z, old.yaw_rate),
     )
 
 

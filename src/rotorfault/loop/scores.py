@@ -90,6 +90,7 @@ class Landing(NamedTuple):
     speed: Scalar  # m/s, downwards
     slide: Scalar  # m/s, horizontal
     cosine: Scalar  # of the tilt
+    yaw_rate: Scalar  # rad/s
 
 
 class Scores(NamedTuple):

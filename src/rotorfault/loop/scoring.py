@@ -119,7 +119,7 @@ class Scoring:
     def initial(self) -> Scores:
         """Nothing counted."""
         none, never, each_rotor = zeros(), Vec3(-1.0, -1.0, -1.0), PerRotor.all(0.0, self.count_of_rotors)
-        landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0) if self.lands else ()
+        landing = Landing(-1.0, -1.0, -1.0, none, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0) if self.lands else ()
         return Scores(
             over=0.0, end=0.0, seen=0.0, last_outside=never, last_away=-1.0, late_square=none, late_yaw_square=0.0,
             yaw_error=0.0, position_square=none, attitude_square=none, position_error=none,

@@ -50,7 +50,7 @@ GIVEN_UP = ("tilt", "thrust", "yaw")
 FEWEST = 4  # rotors that a table has columns of, so that those of smaller vehicles can be joined with others
 LANDING = (
     "fault_time", "confirmed_time", "touch_down_time", "rotors_stopped_time", "speed", "horizontal_speed", "tilt",
-    "distance",
+    "distance", "yaw_rate",
 )  # fmt: skip
 
 Columns = dict[str, NDArray[Any]]
@@ -278,6 +278,7 @@ def _landing(scores: Scores, onsets: Sequence[Any], end_time: NDArray[Any]) -> C
                 landing.slide,
                 np.arccos(np.clip(landing.cosine, -1.0, 1.0)),
                 landing.distance,
+                landing.yaw_rate,
             )
         ),
     )

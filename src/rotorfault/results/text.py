@@ -130,6 +130,7 @@ def landing_rows(landing: dict[str, Any]) -> list[tuple[str, str]]:
             f"{number(landing['speed'], 'm/s', 3)}, {number(landing['horizontal_speed'], 'm/s', 3)}; "
             f"{number(landing['tilt'], 'rad', 3)} ({number(math.degrees(landing['tilt']), 'deg', 3)})",
         ),
+        ("  yaw rate", number(landing["yaw_rate"], "rad/s", 3)),
         ("  distance from the fault", number(landing["distance"], "m", 3)),
         ("  rotors stopped", "no" if stopped is None else f"at {number(stopped, 's')}"),
     ]

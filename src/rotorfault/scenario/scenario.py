@@ -154,7 +154,8 @@ class Scenario(Strict):
                 "record_period", f"got {self.record_period:g} s; allowed: a multiple of the period {self.period:g} s"
             )
         if self.maybe(GROUND) is None and getattr(self[ON_FAULT].factory, "lands", False):
-            raise refusal("on_fault", "got 'land' without ground; give its height, such as ground = 0.0")
+            kind = self[ON_FAULT].kind
+            raise refusal("on_fault", f"got '{kind}' without ground; give its height, such as ground = 0.0")
         if self.duration < self.period * (1.0 - PERIOD_TOLERANCE):
             raise refusal("duration", f"got {self.duration:g} s; allowed: at least one period, {self.period:g} s")
         if not _divides(self.period, self.duration):

@@ -75,7 +75,8 @@ class Controller(Block[ControlInputs, ControlOutput, MemoryT, ParametersT]):
 
 
 def _inputs(instant: Instant) -> ControlInputs:
-    believed = instant.decision.diagnosis
+    believed, spin = instant.decision.diagnosis, instant.decision.spin
+    with_yaw = thrusts_in_balance(instant.vehicle, believed.loss, believed.stuck)[0]
     return ControlInputs(
         estimate=instant.estimate,
         reference=instant.decision.reference,
@@ -86,7 +87,8 @@ def _inputs(instant: Instant) -> ControlInputs:
         prediction=instant.prediction,
         residual_speed=instant.expectation.residual_speed,
         thrust_available=thrust_available(instant.vehicle, believed.loss, believed.stuck),
-        thrust_with_yaw=thrusts_in_balance(instant.vehicle, believed.loss, believed.stuck)[0],
+        # Who is to spin has none.
+        thrust_with_yaw=with_yaw if isinstance(spin, tuple) else with_yaw * (1.0 - spin),
     )
 
 

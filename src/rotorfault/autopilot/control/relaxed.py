@@ -149,16 +149,8 @@ def relaxed_axis(
     dt : scalar, s
         Sampling period.
     """
-    weight = vehicle.mass * vehicle.gravity
     given_up = yaw_given_up(vehicle, with_yaw)
-    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
-    balance = _balanced_thrust(vehicle, able, parameters.reserve)
-
-    def room(most: Scalar, thrust: Scalar) -> Scalar:
-        # A dead rotor bounds nothing.
-        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
-
-    most = able.map(room, balance).reduce(minimum) * weight
+    most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
     tau = wrench_of(vehicle, balance).torque_B
     wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
@@ -191,6 +183,29 @@ def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:
     """
     weight = vehicle.mass * vehicle.gravity
     return clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
+
+
+def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> tuple[Scalar, PerRotor]:
+    """Most thrust in N that the believed rotors give together in the balance of the spin, and thrusts at the weight.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed.
+    believed : Diagnosis
+        Of its rotors.
+    reserve : scalar
+        Least thrust of a living rotor, as a share of equal ones.
+    """
+    weight = vehicle.mass * vehicle.gravity
+    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
+    balance = _balanced_thrust(vehicle, able, reserve)
+
+    def room(most: Scalar, thrust: Scalar) -> Scalar:
+        # A dead rotor bounds nothing.
+        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
+
+    return able.map(room, balance).reduce(minimum) * weight, balance
 
 
 def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:

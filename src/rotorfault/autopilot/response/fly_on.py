@@ -8,11 +8,9 @@ from rotorfault.autopilot.instant import Decision
 from rotorfault.autopilot.response.protocol import Response, ResponseInputs
 from rotorfault.maths.scalar import Scalar
 from rotorfault.model.block import Nothing, Record
-from rotorfault.model.slot import register
 
 
 @final
-@register("continue")
 class FlyOn(Response[Nothing, Nothing]):
     """Fly on as the scenario says, whatever is diagnosed."""
 

@@ -9,6 +9,9 @@ with the horizontal goal 0: it brakes, exponentially once slow, and then holds t
 :math:`-w\,\max(0, 1 - |v_{xy}| / w)`: it sinks at the rate w as soon as the braking is over. The controller gets p, v
 and this acceleration as reference.
 
+A body that spins because its rotors cannot hold yaw sinks in the same way; its controller knows how. What it feels of
+its own wobble and of noise is more, so there contact is suspected above ``spin_contact_share``.
+
 The ground's height is not used; both signs of it come from measurements and from what the believed rotors give.
 
 *Contact* is suspected while the reference sinks at w/2 or faster and an upward force that nothing explains,
@@ -31,6 +34,8 @@ from typing import Annotated, ClassVar, NamedTuple, final
 
 from pydantic import Field
 
+from rotorfault.autopilot.allocation.available import thrusts_in_balance
+from rotorfault.autopilot.control.relaxed import yaw_given_up
 from rotorfault.autopilot.instant import Decision
 from rotorfault.autopilot.prediction import predict
 from rotorfault.autopilot.response.protocol import Response, ResponseInputs
@@ -52,7 +57,6 @@ from rotorfault.maths.scalar import (
 )
 from rotorfault.model.block import Context, Record
 from rotorfault.model.signals import Diagnosis, Reference, Stuck, following
-from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
 
 HOLD = 0.1  # relief above which the belief about the rotors is held: suspicion has then lasted a tenth of `relief`
@@ -66,6 +70,7 @@ class LandParameters(NamedTuple):
     time_constant: Scalar  # s
     confirmation: Scalar  # s
     contact_share: Scalar  # 1
+    spin_contact_share: Scalar  # 1
     contact_filter: Scalar  # s
     relief: Scalar  # s
     still_speed: Scalar  # m/s
@@ -98,7 +103,6 @@ class LandTelemetry(NamedTuple):
 
 
 @final
-@register("land")
 class Land(Response[LandMemory, LandParameters]):
     """Brake, descend level to the ground at a gentle rate, recognise touch-down, stop the rotors."""
 
@@ -115,6 +119,11 @@ class Land(Response[LandMemory, LandParameters]):
         )
         contact_share: float = Field(
             default=0.2, gt=0.0, description="upward force, as share of the weight, that is taken for the ground"
+        )
+        # Noise of 0.01 m/s is 1 m/s^2 behind this filter, and the wobble of a spin as much again: with a gust on top
+        # they stay below it; a touch at 0.5 m/s gives 25 m/s^2 and more.
+        spin_contact_share: float = Field(
+            default=0.6, gt=0.0, description="the same of a body that spins, because yaw cannot be held"
         )
         contact_filter: float = Field(default=0.01, gt=0.0, description="time constant of its low-pass [s]")
         relief: float = Field(
@@ -153,6 +162,23 @@ class Land(Response[LandMemory, LandParameters]):
         self, memory: LandMemory, inputs: ResponseInputs, parameters: LandParameters, dt: Scalar
     ) -> tuple[LandMemory, Decision, Record]:
         """One sampling instant."""
+        return self.decide(memory, inputs, parameters, 1.0, dt)
+
+    def decide(
+        self, memory: LandMemory, inputs: ResponseInputs, parameters: LandParameters, may: Scalar, dt: Scalar
+    ) -> tuple[LandMemory, Decision, LandTelemetry]:
+        """One sampling instant of a landing that only begins where it may.
+
+        Parameters
+        ----------
+        memory : LandMemory
+        inputs : ResponseInputs
+        parameters : LandParameters
+        may : scalar, 1 or 0
+            Whether a landing may begin now; one that has begun goes on.
+        dt : scalar, s
+            Sampling period.
+        """
         diagnosis = self._believed(memory, inputs.diagnosis)
         prediction = predict(inputs.expectation, diagnosis.loss, inputs.vehicle, diagnosis.stuck)
         unexplained = inputs.estimate.v_W.z - inputs.expectation.previous.v_W.z - prediction.delta_v_W.z
@@ -160,7 +186,7 @@ class Land(Response[LandMemory, LandParameters]):
         p, seen = parameters, inputs.estimate
         # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
         half = 0.5 * dt
-        none = diagnosis.flagged.map(negated).reduce(both)
+        none = either(diagnosis.flagged.map(negated).reduce(both), negated(may))
         flagged = select(none, 0.0, memory.flagged + dt)
         begun = both(negated(memory.landing), both(negated(none), greater_equal(flagged, p.confirmation - half)))
         landing = either(memory.landing, begun)
@@ -171,7 +197,10 @@ class Land(Response[LandMemory, LandParameters]):
         # Contact: suspected, and answered.
         sinking = both(landing, less(v_W.z, -0.5 * p.descent_rate))
         lift = memory.lift + (unexplained - memory.lift * dt) / (p.contact_filter + dt)
-        contact = both(sinking, greater(lift, p.contact_share * inputs.vehicle.gravity))
+        with_yaw, _ = thrusts_in_balance(inputs.vehicle, diagnosis.loss, diagnosis.stuck)
+        spins = yaw_given_up(inputs.vehicle, with_yaw)
+        share = p.contact_share + (p.spin_contact_share - p.contact_share) * spins
+        contact = both(sinking, greater(lift, share * inputs.vehicle.gravity))
         relief = memory.relief + (contact - memory.relief) * (dt / (p.relief + dt))
 
         # Touch-down.
