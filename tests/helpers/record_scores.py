@@ -196,10 +196,10 @@ def landing(scenario: Scenario, s: Mapping[str, Array], time: Array, touched: Ar
     struck = onset < time[-1] and np.isfinite(begun)
     times = [onset if struck else np.nan, begun, first(touched, time), first(stage > 1.5, time)]
     if not touched.any():
-        return [*times, *[np.nan] * 4]
+        return [*times, *[np.nan] * 5]
     at = int(np.argmax(touched))
     origin = s["position"][np.argmax(time >= min(onset, begun) - ROUNDING)]
     before = s["velocity"][at - 1]
     away = s["position"][at] - origin
     tilt = np.arccos(np.clip(up(s["quaternion"][at - 1]), -1.0, 1.0))
-    return [*times, -before[2], np.hypot(*before[:2]), tilt, np.hypot(*away[:2])]
+    return [*times, -before[2], np.hypot(*before[:2]), tilt, np.hypot(*away[:2]), s["body_rates"][at, 2]]

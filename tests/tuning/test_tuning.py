@@ -193,3 +193,17 @@ def test_what_a_search_gives_is_a_preset(controller: str, monkeypatch: pytest.Mo
         assert part.settings.stiffness == tuned.settings["stiffness"]
     else:
         assert part.settings.cascade.tilt_max == tuned.settings["cascade"]["tilt_max"]
+
+
+def test_settings_with_tables_and_lists_of_them_are_read_back() -> None:
+    """A vehicle by its name, with a number of it changed, and a list of faults."""
+    settings = {
+        "vehicle": "hummingbird",
+        "vehicle.air.rotor_drag": {"value": 1e-4, "unit": "kg/rad", "source": "of this test"},
+        "fault": [{"kind": "total", "rotor": 1, "time": 1.0}],
+        "wind.wind_at_6m": 5.0,
+    }
+    text = search.Tuned("smc", {}, {"settings": settings}).as_toml("spin")
+    read = tomllib.loads(text)["spin"]["record"]["settings"]
+    assert read.pop("wind") == {"wind_at_6m": settings.pop("wind.wind_at_6m")}
+    assert read == settings

@@ -262,10 +262,13 @@ def _rows(batch: Batch, name: str) -> range:
 
 
 def _table(tables: dict[str, Any], prefix: str) -> list[str]:
-    plain = {key: value for key, value in tables.items() if not isinstance(value, dict)}
-    lines = [f"[{prefix}]", *(f"{_key(key)} = {_value(value)}" for key, value in plain.items()), ""] if plain else []
+    # A dotted key below one that has a value of its own, as `vehicle.mass` below `vehicle`, cannot be a table there.
+    whole = {key for key in tables if "." in key and key.partition(".")[0] in tables}
+    plain = {key: value for key, value in tables.items() if key in whole or not isinstance(value, dict)}
+    written = (f"{json.dumps(key) if key in whole else _key(key)} = {_value(value)}" for key, value in plain.items())
+    lines = [f"[{prefix}]", *written, ""] if plain else []
     for key, value in tables.items():
-        if isinstance(value, dict):
+        if key not in plain:
             lines += _table(value, f"{prefix}.{_key(key)}")
     return lines
 
@@ -273,6 +276,8 @@ def _table(tables: dict[str, Any], prefix: str) -> list[str]:
 def _value(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{_key(key)} = {_value(one)}' for key, one in value.items())} }}"
     # JSON's texts and truth values are TOML's too; its numbers are Python's, but for those that are not finite.
     return json.dumps(value) if isinstance(value, (str, bool)) else repr(value)
 
