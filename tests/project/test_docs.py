@@ -186,7 +186,9 @@ def test_signals_are_those_of_flights() -> None:
     rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
     seen = set()
     common = {"duration": 0.002, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
-    for slot, kind in [(name, one) for name in ("controller", "diagnosis", "on_fault") for one in SLOTS[name].registry]:
+    for slot, kind in [
+        (name, one) for name in ("controller", "diagnosis", "on_fault") for one in SLOTS[name].registry
+    ]:
         settings = {**common, f"{slot}.kind": kind}
         data = rf.fly("land-after-fault", settings=settings, engine="python").data
         for name, variable in data.data_vars.items():
