@@ -365,7 +365,7 @@ class ClosedLoop:
         )
 
     def _sensed(self, truth: Truth, time: Scalar, normals: tuple[Scalar, ...], numbers: Any) -> SensorInputs:
-        ground = 0.0 if self.plant.ground is None else self.plant.ground.surface(numbers.ground)
+        ground = 0.0 if self.plant.ground is None else self.plant.ground.height(numbers.ground)
         return SensorInputs(time, truth.state, truth.specific_force_B, normals, truth.rotor_speed, ground)
 
     def _kept(self, held: Held, sensors: Any) -> Any:

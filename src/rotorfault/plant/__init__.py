@@ -11,6 +11,7 @@ from rotorfault.plant.models import PLANT, BodyModel
 from rotorfault.plant.paper_model import PaperModel
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rigid_body import RigidBody
+from rotorfault.plant.sensor_sets import Crazyflie, GpsConsumer, Mocap
 from rotorfault.plant.sensors import SENSORS, Sensors
 from rotorfault.plant.wind import WIND, Air, Wind
 
@@ -22,9 +23,12 @@ __all__ = [
     "WIND",
     "Air",
     "BodyModel",
+    "Crazyflie",
     "Dryden",
     "Fault",
+    "GpsConsumer",
     "Ground",
+    "Mocap",
     "PaperModel",
     "Plant",
     "PlantParameters",

@@ -38,7 +38,15 @@ class SensorInputs(NamedTuple):
 
 
 class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
-    """A set of sensors: `step` turns the truth of a sampling instant into readings."""
+    """A set of sensors: `step` turns the truth of a sampling instant into readings.
+
+    Attributes
+    ----------
+    estimator : str
+        Of a scenario with these sensors that names none.
+    """
+
+    estimator: ClassVar[str] = "direct"
 
     def model(self, context: Context) -> SensorModel:
         """What the autopilot may believe of the set, as a data sheet says it; nothing, if a part says nothing.

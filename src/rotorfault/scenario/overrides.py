@@ -13,6 +13,7 @@ from rotorfault.model.vehicle import ROTOR_NUMBERS
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.mismatch import ROTOR_FACTORS
 from rotorfault.scenario.part import change_kind, change_preset
+from rotorfault.scenario.sensed import forget_estimator
 from rotorfault.scenario.slots import SLOTS
 
 LISTED = (*ROTOR_NUMBERS, "rotor_bandwidth_down")
@@ -32,6 +33,7 @@ def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
         *path, last = key.split(".")
         return (len(path), False) if last == "kind" else (len(path) + 1, last != "preset")
 
+    forget_estimator(tables, changes)
     for key in sorted(changes, key=outermost_first):
         override(tables, key, changes[key])
 
@@ -66,7 +68,8 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
             if here is tables and part in SLOTS and (shorthand := SLOTS[part].shorthand) is not None:
                 # What stands for a table, such as the ground's height alone, is laid out likewise.
                 inner = here[part] = shorthand(inner)
-            if (isinstance(inner, str) and depth == len(path) - 1) or inner is None:
+            named = isinstance(inner, str) and (depth == len(path) - 1 or (here is tables and part in SLOTS))
+            if named or inner is None:
                 # A bare name stands for a table with that kind.
                 inner = here[part] = {} if inner is None else {"kind": inner}
             here = inner

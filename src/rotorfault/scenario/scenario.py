@@ -38,6 +38,7 @@ from rotorfault.plant.ground import GROUND
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part, field_of
+from rotorfault.scenario.sensed import with_estimator
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.time_grid import require_flyable, require_on_grid
 
@@ -140,6 +141,11 @@ class Scenario(Strict):
             for part in value if slot.many else (value,):
                 if part is not None:
                     yield slot, part
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sensed(cls, tables: Any) -> Any:
+        return with_estimator(tables)
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:

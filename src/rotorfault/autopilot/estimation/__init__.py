@@ -4,6 +4,7 @@ Importing the package registers every estimator, so that the registry is complet
 """
 
 from rotorfault.autopilot.estimation.direct import Direct
+from rotorfault.autopilot.estimation.eskf import Eskf
 from rotorfault.autopilot.estimation.protocol import ESTIMATOR, Estimator, EstimatorInputs
 
-__all__ = ["ESTIMATOR", "Direct", "Estimator", "EstimatorInputs"]
+__all__ = ["ESTIMATOR", "Direct", "Eskf", "Estimator", "EstimatorInputs"]

@@ -1,0 +1,294 @@
+r"""Error-state Kalman filter of attitude, velocity, position and the biases of gyro and accelerometer.
+
+The nominal state is carried on by the inertial readings (strapdown, midpoint rule),
+
+.. math:: \dot p = v, \quad \dot v = R (f - b_f) + g, \quad \dot q = \tfrac12\, q \otimes (\omega - b_\omega),
+
+its error by the linear equations about it, attitude errors :math:`\theta` being small rotations in the world
+(:math:`R_{true} = \mathrm{Exp}(\theta) R`; Sola, "Quaternion kinematics for the error-state Kalman filter", 2017,
+section 7): with :math:`f_W = R(f - b_f)`
+
+.. math:: \delta\dot p = \delta v, \quad \delta\dot v = -f_W \times^\top\!\theta - R\,\delta b_f, \quad
+          \dot\theta = -R\,\delta b_\omega
+
+where the first product is :math:`\theta \times f_W`. In these axes the error of the attitude does not turn with the
+body, so a vehicle that spins costs nothing and blurs nothing. Slow errors of position and barometer, where the
+sensors have them, are states too (Gauss-Markov). Measurements are taken in one scalar after the other
+(`rotorfault.autopilot.estimation.covariance`), late ones against the state of the instant when they were taken
+(`rotorfault.autopilot.estimation.behind`); the corrections are applied once, at the end. What the noise is comes from
+what is believed of the sensors (`rotorfault.model.sensor_model`), nothing is tuned.
+
+Departures: the covariance takes the mean state over a period, and of a late measurement the lever of its velocity
+over the delay, not its history. A rate beyond the gyro's range is not known: while a reading is at its end, the
+attitude blurs by `saturated`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple, final
+
+from pydantic import Field
+
+from rotorfault.autopilot.estimation import measurements
+from rotorfault.autopilot.estimation.behind import Moved, corrected, moved_on, none_yet
+from rotorfault.autopilot.estimation.covariance import Filter
+from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs, required
+from rotorfault.autopilot.estimation.start import first_attitude, first_filter
+from rotorfault.autopilot.estimation.states import ERROR, FORCE_BIAS, GYRO_BIAS, P, States, V
+from rotorfault.base.config import Strict
+from rotorfault.base.errors import InputError
+from rotorfault.maths.geometry import Mat3, Vec3, zeros
+from rotorfault.maths.rotation import Quat
+from rotorfault.maths.scalar import Scalar, absolute, exp, greater, maximum, sqrt
+from rotorfault.model.block import Context, Record
+from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
+from rotorfault.model.signals import Deviations, Estimate, Reading
+from rotorfault.model.slot import register
+from rotorfault.model.telemetry import BODY, NO_FRAME, WORLD, Quantity
+
+
+class EskfSignals(NamedTuple):
+    """How well the filter believes to know, and what measurements say of that."""
+
+    position_std: Annotated[Vec3, Quantity("m", WORLD, "standard deviation of the estimated position")]
+    velocity_std: Annotated[Vec3, Quantity("m/s", WORLD, "standard deviation of the estimated velocity")]
+    attitude_std: Annotated[Vec3, Quantity("rad", WORLD, "its standard deviation, about the world's axes")]
+    gyro_bias: Annotated[Vec3, Quantity("rad/s", BODY, "estimated bias of the gyro")]
+    gyro_bias_std: Annotated[Vec3, Quantity("rad/s", BODY, "its standard deviation")]
+    accelerometer_bias: Annotated[Vec3, Quantity("m/s^2", BODY, "estimated bias of the accelerometer")]
+    accelerometer_bias_std: Annotated[Vec3, Quantity("m/s^2", BODY, "its standard deviation")]
+    innovation: Annotated[Vec3, Quantity("m", WORLD, "measured less predicted position; 0 without a measurement")]
+    nis: Annotated[Scalar, Quantity("1", NO_FRAME, "normalised innovations squared, summed over this instant")]
+    measured: Annotated[Scalar, Quantity("1", NO_FRAME, "scalar measurements taken in at this instant")]
+
+
+class EskfParameters(NamedTuple):
+    """Numbers of the filter."""
+
+    sensors: SensorModel
+    period: Scalar  # s
+    start_tilt: Scalar  # rad
+    start_speed: Scalar  # m/s
+    saturated: Scalar  # rad/s/sqrt(Hz)
+
+
+class EskfMemory(NamedTuple):
+    """The nominal state, the covariance and what the last instant read."""
+
+    p_W: Vec3  # m
+    v_W: Vec3  # m/s
+    q_WB: Quat
+    gyro_bias: Vec3  # rad/s
+    force_bias: Vec3  # m/s^2
+    slow: tuple[Any, ...]  # slow errors: of position (Vec3) and barometer, where there are any
+    covariance: tuple[Scalar, ...]
+    rates: Vec3  # rad/s: unbiased, of the last instant
+    force_W: Vec3  # m/s^2: unbiased, of the last instant
+    behind: tuple[Moved, ...]
+    floor: Scalar  # m: height of the ground, as first seen
+    count: Scalar  # sampling instants so far
+
+
+def timing_of_fix(sensors: SensorModel) -> Timing:
+    """When position, velocity and attitude come; together, as one source gives them."""
+    for sensor in (sensors.position, sensors.velocity, sensors.attitude):
+        if isinstance(sensor, SensorNoise) and sensor.timing.every:
+            return sensor.timing
+    return Timing()
+
+
+@final
+@register("eskf")
+class Eskf(Estimator[EskfMemory, EskfParameters]):
+    """Error-state Kalman filter of attitude, velocity, position and biases."""
+
+    Telemetry = EskfSignals
+
+    class Settings(Strict):
+        """What no sensor tells; noise and rates are those of the sensors."""
+
+        start_tilt: float = Field(
+            0.02, gt=0.0, le=1.0, description="standard deviation of the tilt at the start beside the sensors' [rad]"
+        )
+        start_speed: float = Field(
+            0.1, gt=0.0, le=100.0, description="standard deviation of the first velocity, if none is measured [m/s]"
+        )
+        saturated: float = Field(
+            0.3, ge=0.0, le=100.0, description="noise density of a rate beyond the gyro's range [rad/s/sqrt(Hz)]"
+        )
+
+    def parameters(self, context: Context) -> EskfParameters:
+        """What is believed of the sensors, and the settings."""
+        sensors, s = context.sensors, self.settings
+        if not isinstance(sensors, SensorModel):
+            sensors = SensorModel()
+        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated)
+
+    def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:
+        """From the first readings alone."""
+        sensors = _known(parameters.sensors)
+        readings, gravity = inputs.readings, inputs.vehicle.gravity
+        position = required(readings, "position", "eskf").value
+        velocity = readings.velocity
+        force = required(readings, "specific_force", "eskf").value
+        q_WB = first_attitude(readings, sensors)
+        filter_ = first_filter(readings, sensors, q_WB, parameters.start_tilt, parameters.start_speed, gravity)
+        distance = readings.range
+        floor = position.z - distance.value * q_WB.z_axis().z if isinstance(distance, Reading) else 0.0
+        return EskfMemory(
+            position,
+            velocity.value if isinstance(velocity, Reading) else zeros(),
+            q_WB,
+            zeros(),
+            zeros(),
+            States.of(sensors).no_slow_errors(),
+            filter_.triangle,
+            required(readings, "rates", "eskf").value,
+            q_WB.matrix() @ force,
+            none_yet(timing_of_fix(sensors)),
+            floor,
+            0.0,
+        )
+
+    def step(
+        self, memory: EskfMemory, inputs: EstimatorInputs, parameters: EskfParameters, dt: Scalar
+    ) -> tuple[EskfMemory, Estimate, Record]:
+        """Carry on by the inertial readings, then take in what has arrived."""
+        sensors, readings = _known(parameters.sensors), inputs.readings
+        states = States.of(sensors)
+        running = greater(memory.count, 0.5)  # at the first instant no time has gone by, and all is read already
+        spell = dt * running
+        rates = required(readings, "rates", "eskf").value - memory.gyro_bias
+        force = required(readings, "specific_force", "eskf").value - memory.force_bias
+        force = force - rates.cross(rates.cross(sensors.imu_at_B))
+        # The mean of both ends of the period, which is what a sampled reading stands for.
+        turn = turn_by((memory.rates + rates) * (0.5 * spell))
+        q_WB = (memory.q_WB @ turn).normalised()
+        R = q_WB.matrix()
+        force_W = R @ force
+        mean_W = (memory.force_W + force_W) * 0.5
+        gravity = inputs.vehicle.gravity
+        gained = (mean_W - Vec3(0.0, 0.0, gravity)) * spell
+        moved = (memory.v_W + gained * 0.5) * spell
+        p_W, v_W = memory.p_W + moved, memory.v_W + gained
+        filter_ = Filter(memory.covariance, states.number)
+        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, readings.rates)
+        timing = timing_of_fix(sensors)
+        behind = moved_on(memory.behind, moved, gained, turn, timing, memory.count)
+        belief = measurements.Belief(p_W, v_W, q_WB, R, rates, slow, memory.floor, gravity)
+        then = behind[-1] if behind else None
+        innovation = measurements.take_in(filter_, readings, sensors, states, belief, then, timing.late * dt, running)
+
+        error = filter_.error
+        speed = _three(error, V)
+        small = turn_by(_three(error, ERROR))
+        q_WB = (small @ q_WB).normalised()
+        gyro_bias = memory.gyro_bias + _three(error, GYRO_BIAS)
+        force_bias = memory.force_bias + _three(error, FORCE_BIAS)
+        after = EskfMemory(
+            p_W + _three(error, P),
+            v_W + speed,
+            q_WB,
+            gyro_bias,
+            force_bias,
+            states.slow_corrected(slow, error),
+            filter_.triangle,
+            rates,
+            force_W,
+            corrected(behind, speed, timing, memory.count, dt),
+            memory.floor,
+            memory.count + 1.0,
+        )
+        deviations = self._deviations(filter_, sensors)
+        estimate = Estimate(
+            after.p_W, after.v_W, q_WB, rates, force,
+            gyro_bias=gyro_bias, accelerometer_bias=force_bias, std=deviations,
+        )  # fmt: skip
+        signals = EskfSignals(
+            deviations.p_W, deviations.v_W, deviations.attitude_W, gyro_bias, _there(deviations.gyro_bias),
+            force_bias, _there(deviations.accelerometer_bias), innovation, filter_.squares, filter_.measured,
+        )  # fmt: skip
+        return after, estimate, signals
+
+    @staticmethod
+    def _predict(
+        filter_: Filter, memory: EskfMemory, parameters: EskfParameters, R: Mat3, force_W: Vec3, spell: Scalar,
+        running: Scalar, gyro: Any,
+    ) -> tuple[Any, ...]:  # fmt: skip
+        """The covariance a period later, and the slow errors."""
+        sensors = parameters.sensors
+        rates, force = sensors.rates, sensors.specific_force
+        assert isinstance(rates, SensorNoise)
+        assert isinstance(force, SensorNoise)
+        filter_.move({P + i: {V + i: spell} for i in range(3)})
+        f, rows = force_W * spell, (R * -spell).rows
+        lean = ({1: f.z, 2: -f.y}, {0: -f.z, 2: f.x}, {0: f.y, 1: -f.x})  # theta x f
+        filter_.move(
+            {
+                V + i: {ERROR + j: c for j, c in lean[i].items()} | {FORCE_BIAS + j: c for j, c in enumerate(rows[i])}
+                for i in range(3)
+            }
+        )
+        filter_.move({ERROR + i: {GYRO_BIAS + j: c for j, c in enumerate(rows[i])} for i in range(3)})
+        # A reading that is held over several instants is off by the same in each.
+        x, y, z = (absolute(one) for one in gyro.value)
+        at_end = maximum(maximum(x, y), z)
+        beyond = greater(at_end, rates.limit * (1.0 - 1e-9))
+        blur = (
+            rates.std * rates.std * rates.timing.every * spell + beyond * parameters.saturated * parameters.saturated
+        )
+        for i in range(3):
+            filter_.blur(V + i, force.std * force.std * force.timing.every * spell * spell)
+            filter_.blur(ERROR + i, blur * spell)
+            filter_.blur(FORCE_BIAS + i, force.bias_walk * force.bias_walk * spell)
+            filter_.blur(GYRO_BIAS + i, rates.bias_walk * rates.bias_walk * spell)
+        slow = []
+        for group, value in zip(States.of(sensors).slow, memory.slow, strict=True):
+            noise = group.noise
+            factor = 1.0 + running * (exp(-parameters.period / noise.wander_time) - 1.0)
+            for state in group.states:
+                filter_.scale(state, factor)
+                filter_.blur(state, noise.wander * noise.wander * (1.0 - factor * factor))
+            slow.append(value * factor)
+        return tuple(slow)
+
+    @staticmethod
+    def _deviations(filter_: Filter, sensors: SensorModel) -> Deviations:
+        """Standard deviations of what is estimated."""
+        rates, force = sensors.rates, sensors.specific_force
+        assert isinstance(rates, SensorNoise)
+        assert isinstance(force, SensorNoise)
+
+        def std(first: int, more: Scalar = 0.0) -> Vec3:
+            return Vec3(*(sqrt(maximum(filter_[i, i], 0.0) + more) for i in range(first, first + 3)))
+
+        gyro = rates.std * rates.std + 0.5 * rates.vibration * rates.vibration
+        felt = force.std * force.std + 0.5 * force.vibration * force.vibration
+        return Deviations(
+            std(P), std(V), std(ERROR), std(GYRO_BIAS, gyro), std(FORCE_BIAS, felt), std(GYRO_BIAS), std(FORCE_BIAS)
+        )
+
+
+def turn_by(rotation: Vec3) -> Quat:
+    """The rotation by a small vector in rad, to the fifth power of its angle."""
+    return Quat.small(rotation * (1.0 + rotation.dot(rotation) * (1.0 / 12.0)))
+
+
+def _there(value: Vec3 | tuple[()]) -> Vec3:
+    assert isinstance(value, Vec3)
+    return value
+
+
+def _three(values: list[Scalar], first: int) -> Vec3:
+    return Vec3(*values[first : first + 3])
+
+
+def _known(sensors: SensorModel) -> SensorModel:
+    """The sensors, if what the filter cannot do without is known of them."""
+    for name in ("rates", "specific_force", "position"):
+        if not isinstance(getattr(sensors, name), SensorNoise):
+            raise InputError(
+                f"estimator 'eskf' needs to know the noise of {name}, and the sensors say nothing of it; give them a "
+                "`model` that returns a SensorModel, or choose another estimator"
+            )
+    return sensors

@@ -1,0 +1,56 @@
+"""The error states of the Kalman filter, in order: fifteen, and slow errors where sensors have them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from rotorfault.maths.geometry import Vec3, zeros
+from rotorfault.maths.scalar import Scalar
+from rotorfault.model.sensor_model import SensorModel, SensorNoise
+
+P, V, ERROR, FORCE_BIAS, GYRO_BIAS = 0, 3, 6, 9, 12  # first of three each; ERROR that of attitude
+BASIC = 15
+
+
+class SlowError(NamedTuple):
+    """A slow error of a sensor."""
+
+    sensor: str
+    states: tuple[int, ...]
+    noise: Any  # SensorNoise
+
+
+class States(NamedTuple):
+    """Which states there are, and how many."""
+
+    number: int
+    slow: tuple[SlowError, ...]
+
+    @classmethod
+    def of(cls, sensors: SensorModel) -> States:
+        """Of a set of sensors as believed."""
+        slow, used = [], BASIC
+        for name, width in (("position", 3), ("pressure_altitude", 1)):
+            noise = getattr(sensors, name)
+            if isinstance(noise, SensorNoise) and not isinstance(noise.wander, tuple):
+                slow.append(SlowError(name, tuple(range(used, used + width)), noise))
+                used += width
+        return cls(used, tuple(slow))
+
+    def no_slow_errors(self) -> tuple[Any, ...]:
+        """The slow errors at the start, from which they are counted."""
+        return tuple(zeros() if len(one.states) == 3 else 0.0 for one in self.slow)
+
+    def of_sensor(self, sensor: str, slow: tuple[Any, ...]) -> tuple[tuple[int, ...], Any]:
+        """States and value of the slow error of a sensor; none if it has none."""
+        for one, value in zip(self.slow, slow, strict=True):
+            if one.sensor == sensor:
+                return one.states, value
+        return (), None
+
+    def slow_corrected(self, slow: tuple[Any, ...], error: list[Scalar]) -> tuple[Any, ...]:
+        """Slow errors after the corrections of an instant."""
+        return tuple(
+            value + (Vec3(*(error[i] for i in one.states)) if len(one.states) == 3 else error[one.states[0]])
+            for one, value in zip(self.slow, slow, strict=True)
+        )
