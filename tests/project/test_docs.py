@@ -117,8 +117,8 @@ def test_tables_are_those_of_the_code(path: Path) -> None:
 @pytest.mark.parametrize(("slot", "kind"), PARTS)
 def test_every_part_has_a_section_with_all_its_settings(slot: str, kind: str) -> None:
     table = f"{SLOTS[slot].group}/{kind}"
-    page = DETECTORS if f"<!-- table: {table} -->" in TEXT[DOCS / DETECTORS] else PAGE_OF[slot]
-    text = section(page, kind, table)
+    pages = [page for page in (DETECTORS, "sensing.md") if f"<!-- table: {table} -->" in TEXT[DOCS / page]]
+    text = section((pages or [PAGE_OF[slot]])[0], kind, table)
     for setting in TOOL.settings(SLOTS[slot].registry[kind].Settings):
         assert f"`{setting.key}`" in text
 
@@ -186,9 +186,8 @@ def test_signals_are_those_of_flights() -> None:
     rows = {cells[1].strip("` "): [cell.strip() for cell in cells] for cells in (line.split("|") for line in lines)}
     seen = set()
     common = {"duration": 0.002, "vehicle": "crazyflie-2.1", "start.charge": 1.0}
-    for slot, kind in [
-        (name, one) for name in ("controller", "diagnosis", "on_fault") for one in SLOTS[name].registry
-    ]:
+    slots = ("controller", "diagnosis", "on_fault", "sensors")
+    for slot, kind in [(name, one) for name in slots for one in SLOTS[name].registry]:
         settings = {**common, f"{slot}.kind": kind}
         data = rf.fly("land-after-fault", settings=settings, engine="python").data
         for name, variable in data.data_vars.items():

@@ -39,6 +39,7 @@ CHILDREN: dict[str, list[str]] = {
         "controllers/index",
         "diagnosis",
         "detectors",
+        "sensing",
         "allocation",
         "attainable",
         "total-loss",

@@ -35,7 +35,7 @@ OURS = "our estimate"
 
 def _number(value: float, what: str, source: str, **limits: Any) -> Any:
     """A setting with its source in its description."""
-    return Field(value, description=f"{what}; {source}", **(limits or {"ge": 0.0}))
+    return Field(float(f"{value:.8g}"), description=f"{what}; {source}", **(limits or {"ge": 0.0}))
 
 
 def _group(kind: type[Strict]) -> Any:

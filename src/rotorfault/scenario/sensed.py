@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotorfault.autopilot.estimation import ESTIMATOR
-from rotorfault.plant.sensors import SENSORS
 from rotorfault.scenario.part import Part, part_from
+from rotorfault.scenario.slots import SLOTS
+
+SENSORS, ESTIMATOR = SLOTS["sensors"], SLOTS["estimator"]
 
 
 def estimator_for(sensors: object) -> str:
