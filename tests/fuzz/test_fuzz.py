@@ -23,6 +23,7 @@ EXAMPLES = {
     "vary": 8,
     "text": 40,
     "flight file": 8,
+    "log": 20,
 }
 
 

@@ -7,6 +7,7 @@ an exception of another kind, and a flight that counts as sound with numbers tha
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import tempfile
 from collections.abc import Callable
@@ -28,6 +29,8 @@ from fuzz_inputs import (
 )
 from fuzz_values import toml
 from hypothesis import strategies as st
+from made_up_logs import LOG_WRITERS, mangled
+from made_up_logs import flown as flown_log
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.flight_set import FlightSet
@@ -38,6 +41,8 @@ from rotorfault.campaigns.study import load_study, study_from
 from rotorfault.flight.flight import Flight, load
 from rotorfault.flight.fly import fly, prepare
 from rotorfault.flight.many import fly_many
+from rotorfault.logs.diagnose import diagnosis_of
+from rotorfault.logs.read import read_log
 from rotorfault.loop.scores import ENDS, SURVIVED
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.results.dataset import read_configuration
@@ -199,6 +204,27 @@ def _read_flight(content: bytes) -> str:
     return _as_file(content, "flight.nc", use)
 
 
+def _read_log(given: tuple[str, int]) -> str:
+    name, seed = given
+    content = made_log(name)
+
+    def use(path: Path) -> str:
+        found = diagnosis_of(read_log(path))
+        json.dumps(found.json(), allow_nan=False)
+        if not str(found) or not np.isclose(sum(one.probability for one in found.causes), 1.0):
+            raise UnsoundError(f"probabilities {[one.probability for one in found.causes]}")
+        return "accepted"
+
+    return _as_file(mangled(content, seed), name, use)
+
+
+@functools.cache
+def made_log(name: str) -> bytes:
+    """A small log of a format, to be damaged."""
+    with tempfile.TemporaryDirectory() as folder:
+        return LOG_WRITERS[name](flown_log(seed=4, seconds=6.0), Path(folder) / name).read_bytes()
+
+
 KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
@@ -209,6 +235,7 @@ KINDS: dict[str, Kind] = {
         Kind("set", assignments(), _fly_assigned),
         Kind("vary", columns(), _fly_columns),
         Kind("text", texts(), _read_bytes),
+        Kind("log", st.tuples(st.sampled_from(sorted(LOG_WRITERS)), st.integers(0, 2**32 - 1)), _read_log),
         Kind("flight file", flight_files(), _read_flight),
     )
 }

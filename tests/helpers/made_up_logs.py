@@ -198,3 +198,25 @@ def write_betaflight(flight: Flown, path: Path) -> Path:
     ]  # fmt: skip
     path.write_text("\n".join(['"Product","Blackbox flight data recorder"', ", ".join(names), *rows]) + "\n")
     return path
+
+
+LOG_WRITERS = {"a.ulg": write_ulog, "a.bin": write_dataflash, "a.csv": write_csv, "b.csv": write_betaflight}
+
+
+def mangled(content: bytes, seed: int) -> bytes:
+    """A log with some of its bytes turned, moved, doubled or gone."""
+    rng = np.random.default_rng(seed)
+    out = bytearray(content)
+    for _ in range(int(rng.integers(1, 30))):
+        at = int(rng.integers(0, max(len(out), 1)))
+        size = int(rng.integers(1, 400))
+        kind = rng.integers(0, 4)
+        if kind == 0:
+            out[at : at + size] = rng.bytes(size)
+        elif kind == 1:
+            del out[at : at + size]
+        elif kind == 2:
+            out[at:at] = out[max(0, at - size) : at]
+        else:
+            out[at : at + 1] = rng.bytes(1)
+    return bytes(out)

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_logs import flown, write_betaflight, write_csv, write_dataflash, write_ulog
+from made_up_logs import LOG_WRITERS as WRITERS
+from made_up_logs import flown, mangled
 
 from rotorfault.base.errors import InputError
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.read import read_log
-
-WRITERS = {"a.ulg": write_ulog, "a.bin": write_dataflash, "a.csv": write_csv, "b.csv": write_betaflight}
 
 
 @pytest.fixture(scope="module")
@@ -55,22 +54,3 @@ def test_a_hostile_log_is_read_or_refused(name: str, seed: int, contents: dict[s
         return
     assert found.causes
     found.json()
-
-
-def mangled(content: bytes, seed: int) -> bytes:
-    """A log with some of its bytes turned, moved, doubled or gone."""
-    rng = np.random.default_rng(seed)
-    out = bytearray(content)
-    for _ in range(int(rng.integers(1, 30))):
-        at = int(rng.integers(0, max(len(out), 1)))
-        size = int(rng.integers(1, 400))
-        kind = rng.integers(0, 4)
-        if kind == 0:
-            out[at : at + size] = rng.bytes(size)
-        elif kind == 1:
-            del out[at : at + size]
-        elif kind == 2:
-            out[at:at] = out[max(0, at - size) : at]
-        else:
-            out[at : at + 1] = rng.bytes(1)
-    return bytes(out)

@@ -117,7 +117,7 @@ def diagnose(
     if json is not None:
         written.append(write_json(found, json))
     if out is not None:
-        written += write_pages(found, out)
+        written += write_pages(found, out, vehicle)
     if written:
         say(f"\nwrote {', '.join(str(path) for path in written)}")
     if refused:
@@ -149,3 +149,30 @@ def baseline(
     say("\n".join(estimate_lines(made, estimates)))
     write_baseline(made, out, {"estimates": [one._asdict() for one in estimates]})
     say(f"\nwrote {out}; use it with: rotorfault diagnose LOG --baseline {out}")
+
+
+@app.command(name="validate-model")
+def validate_model(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help=LOGS)],
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="A vehicle whose file is to predict the log too.")
+    ] = None,
+) -> None:
+    """Say how well a model predicts a log: velocity and attitude one record and half a second ahead.
+
+    A model with few numbers is taken from the first half of the flight and judged on the second, beside a guess that
+    holds body rates and velocity; with --vehicle beside the vehicle's own numbers. It takes commands, rates, attitude
+    and velocity.
+
+    Example: rotorfault validate-model flight.ulg --vehicle x500
+    """
+    from rotorfault.base.text_table import table_lines
+    from rotorfault.logs.prediction import validated
+    from rotorfault.logs.read import read_log
+    from rotorfault.model.vehicle_file import load_vehicle
+
+    file = None if vehicle is None else load_vehicle(vehicle)
+    for number, path in enumerate(logs):
+        found = validated(read_log(path), file)
+        say(("\n" if number else "") + f"{found.log}: {found.predictions} predictions, root mean square of errors")
+        say("\n".join(table_lines(found.table(), "<>>>>", indent=2, rule=True)))

@@ -12,6 +12,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.logs.baseline import Baseline, digest_of, is_baseline, learned, read_baseline
 from rotorfault.logs.diagnose import diagnosis_of
+from rotorfault.logs.page import page_name, write_diagnosis
 from rotorfault.logs.read import read_log
 from rotorfault.logs.verdict import LogDiagnosis
 
@@ -112,7 +113,7 @@ def diagnose(
     known = baseline if isinstance(baseline, Baseline) else baseline_of(paths_of(baseline, "baseline"))
     found = [diagnosed(path, known, vehicle) for path in paths]
     if out is not None:
-        write_pages(found, Path(out))
+        write_pages(found, Path(out), vehicle)
     return found[0] if isinstance(logs, (str, Path)) else found
 
 
@@ -137,10 +138,10 @@ def diagnosed(path: Path, baseline: Baseline | None, vehicle: str | Path | None 
             f"{path}: has {len(log.layout.places)} motors, its baseline {len(baseline.layout.places)}; give a "
             "baseline of the same vehicle"
         )
-    return diagnosis_of(log, baseline)
+    return diagnosis_of(log, baseline, vehicle)
 
 
-def write_pages(found: Sequence[LogDiagnosis], folder: Path) -> list[Path]:
+def write_pages(found: Sequence[LogDiagnosis], folder: Path, vehicle: str | Path | None = None) -> list[Path]:
     """Write a page for each diagnosis.
 
     Parameters
@@ -148,8 +149,17 @@ def write_pages(found: Sequence[LogDiagnosis], folder: Path) -> list[Path]:
     found : sequence of LogDiagnosis
     folder : Path
         Made where there is none.
+    vehicle : str or Path, optional
+        To be drawn.
     """
-    return []
+    names: set[str] = set()
+    written = []
+    for number, one in enumerate(found, start=1):
+        name = page_name(one)
+        name = f"{number}-{name}" if name in names else name
+        names.add(name)
+        written.append(write_diagnosis(one, folder, name, vehicle))
+    return written
 
 
 def write_json(found: Sequence[LogDiagnosis], path: Path) -> Path:

@@ -49,7 +49,7 @@ def mixed(layout: Layout, torque_B: Array, thrust: Array, scaling: str) -> Array
     columns = directions(layout)
     if scaling == "px4":
         norm = np.sqrt((columns[:2] ** 2).sum(axis=1) / (0.5 * columns.shape[1]))
-        columns = np.vstack([columns[:2] / norm[:, None], columns[2:]])
+        columns = np.vstack([columns[:2] / np.maximum(norm, 1e-9)[:, None], columns[2:]])
     else:
         columns = 0.5 * columns
     asked: Array = np.clip(thrust[:, None] + torque_B @ columns, 0.0, 1.0)

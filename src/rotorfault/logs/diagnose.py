@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from rotorfault.logs.baseline import Baseline, hover_command, trim_of
+from rotorfault.logs.detectors import Said, said_by_all
 from rotorfault.logs.dynamics import Residual, Response, block_length, residual_of
-from rotorfault.logs.log import Log, Note
+from rotorfault.logs.log import Log
 from rotorfault.logs.scan import Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
-from rotorfault.logs.sentences import own_words, rotor_words, sudden_evidence, trim_evidence, verdict_of, when
+from rotorfault.logs.sentences import own_words, sudden_evidence, trim_evidence, verdict_of, when
 from rotorfault.logs.trim import PRIOR, Evidence, Trim, directions_of, spread_of, weigh
 from rotorfault.logs.verdict import Cause, LogDiagnosis
 
@@ -37,7 +39,7 @@ class Sudden(NamedTuple):
     push: float
 
 
-def diagnosis_of(log: Log, baseline: Baseline | None = None) -> LogDiagnosis:
+def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path | None = None) -> LogDiagnosis:
     """What a log says of its rotors.
 
     Parameters
@@ -45,6 +47,8 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None) -> LogDiagnosis:
     log : Log
     baseline : Baseline, optional
         Of healthy flights of the same vehicle.
+    vehicle : str or Path, optional
+        Name or file, for the registered sources of diagnosis.
     """
     limits = list(_limits_of_rates(log))
     spans = flight_spans(log)
@@ -62,16 +66,14 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None) -> LogDiagnosis:
     evidence = None if trim is None else _steady(log, trim, baseline)
     causes = _ranked(log, first, evidence, trim, baseline)
     limits += _limits_of_hover(trim, evidence, baseline)
-    own = own_words(log)
+    said: list[Said] = []
+    if vehicle is not None:
+        span = max(spans, key=lambda one: one[1] - one[0])
+        said = said_by_all(log, (span[0] + TAKE_OFF, span[1]), before, vehicle)
     return LogDiagnosis(
-        log,
-        causes,
-        verdict_of(log, causes, evidence),
-        tuple(limits),
-        tuple(one.scan for one in sudden),
-        evidence,
-        own,
-    )
+        log, causes, verdict_of(log, causes, evidence), tuple(limits), tuple(one.scan for one in sudden), evidence,
+        own_words(log), tuple(said),
+    )  # fmt: skip
 
 
 def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known: Response | None) -> list[Sudden]:
@@ -238,6 +240,3 @@ def _nothing(log: Log, limits: list[str], motors: bool) -> LogDiagnosis:
     if motors:
         limits.append("no flight: nothing can be said of rotors that do not carry; give a log with a flight of 10 s")
     return LogDiagnosis(log, ranked, f"the log cannot tell: {why}", tuple(limits), own=own_words(log))
-
-
-__all__ = ["Note", "Sudden", "diagnosis_of", "rotor_words"]

@@ -36,6 +36,7 @@ DEFAULT_LAG = 0.03  # s, where the log does not show it
 BAND = (1.0, 8.0)  # Hz, in which control moves the body more than wind does and noise is not yet the most
 CORRELATED = 0.5  # least correlation of demand and turn with which a gain is believed
 LONGEST = 20_000  # blocks that are looked at for gains
+UPSET = 1.2  # rad of tilt, beyond which the model of hover ends
 LEAST_GAIN_ERROR = 0.1  # of a gain, however well it is known: thrust changes with airspeed and battery
 
 
@@ -105,11 +106,12 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     blocks = _blocks(log, np.arange(begin, end, length))
     rows = directions(log.layout)
     response = known or _response(log, begin, end, rows, hover)
-    command = _lagged(log, blocks.edges, response.lag)
+    command = lagged(log, blocks.edges, response.lag)
     demand = command @ rows.T
     turn = blocks.turn / response.gain
     thrust = hover * blocks.force / G - command.mean(axis=1)
     values = np.column_stack([turn - demand, thrust])
+    values[_upset(log, blocks.edges)] = np.nan
     centred = demand - np.nanmedian(demand, axis=0)
     rate = np.abs(np.gradient(demand, axis=0)) / length
     doubt = np.sqrt(
@@ -119,6 +121,19 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     motors = rows.shape[1]
     patterns = np.vstack([rows, np.full((1, motors), 1.0 / motors)])
     return Residual(blocks.edges[:-1], length, values, np.column_stack([doubt, up]), command, patterns, response)
+
+
+def _upset(log: Log, edges: Array) -> Array:
+    """Blocks in which the vehicle is tilted so far that it no longer hovers, or has been in the last second."""
+    attitude = log.series.get("attitude")
+    if attitude is None:
+        return np.zeros(len(edges) - 1, dtype=bool)
+    w, x, y, z = attitude.at(edges[:-1]).T
+    upright = (w * w - x * x - y * y + z * z) / np.maximum(w * w + x * x + y * y + z * z, 1e-12)
+    over = upright < math.cos(UPSET)
+    width = int(1.0 / (edges[1] - edges[0])) + 1
+    recent: Array = np.convolve(over, np.ones(width))[: len(over)] > 0.0
+    return recent
 
 
 def _blocks(log: Log, edges: Array) -> _Blocks:
@@ -139,7 +154,7 @@ def _blocks(log: Log, edges: Array) -> _Blocks:
     return _Blocks(edges, turn, f_z, speed)
 
 
-def _lagged(log: Log, edges: Array, lag: float) -> Array:
+def lagged(log: Log, edges: Array, lag: float) -> Array:
     """Mean command of each block behind a first-order lag."""
     command = log.series["command"]
     step = min((edges[1] - edges[0]) / 2.0, 0.01)
@@ -172,7 +187,7 @@ def _response(log: Log, begin: float, end: float, rows: Array, hover: float) -> 
         blocks = _blocks(log, np.asarray(begin + length * np.arange(count + 1), dtype=float))
         band = butter(2, [2.0 * length * BAND[0], 2.0 * length * fastest], "band")
         turn = _filtered(band, blocks.turn)
-        fits = [_fits(turn, _filtered(band, _lagged(log, blocks.edges, one) @ rows.T)) for one in LAGS]
+        fits = [_fits(turn, _filtered(band, lagged(log, blocks.edges, one) @ rows.T)) for one in LAGS]
         scores = [float(fit[1, :2].sum()) for fit in fits]
         k = int(np.argmax(scores))
         known = scores[k] > 2.0 * CORRELATED

@@ -71,7 +71,8 @@ def _series(file: ULogFile, name: str, fields: Sequence[str], scale: Array | flo
         topic = file.topics.get((name, instance))
         if topic is not None and len(topic.rows) and _has(topic, fields):
             table = topic.rows.table()
-            values = np.column_stack([table[field].astype(float) for field in fields]) * scale
+            with np.errstate(invalid="ignore", over="ignore"):
+                values = np.column_stack([table[field].astype(float) for field in fields]) * scale
             return Series(table["timestamp"].astype(float) * 1e-6, values)
     return None
 
@@ -191,7 +192,8 @@ def _output(file: ULogFile, count: int) -> Series | None:
         if topic is None or not len(topic.rows) or not _has(topic, fields):
             continue
         table = topic.rows.table()
-        values = np.column_stack([table[field].astype(float) for field in fields])
+        with np.errstate(invalid="ignore", over="ignore"):
+            values = np.column_stack([table[field].astype(float) for field in fields])
         if np.isfinite(values).all() and (best is None or values.std() > best.values.std()):
             best = Series(table["timestamp"].astype(float) * 1e-6, values)
     if best is None:

@@ -31,7 +31,6 @@ FIRST = 3.0  # s at least before anything is said
 SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
 HOLD = 5.0  # s over which evidence is gathered
-UPSET = 1.2  # rad of tilt, beyond which the model of hover ends
 
 
 class Scan(NamedTuple):
@@ -83,14 +82,12 @@ def referenced(values: Array, block: float) -> Array:
     return out
 
 
-def scan(residual: Residual, stop: float | None = None) -> Scan:
+def scan(residual: Residual) -> Scan:
     """Test a flight.
 
     Parameters
     ----------
     residual : Residual
-    stop : float, optional, s
-        Where the vehicle is upset, and nothing later counts.
     """
     rho = referenced(residual.values, residual.block)
     count, motors = len(rho), residual.command.shape[1]
@@ -105,8 +102,7 @@ def scan(residual: Residual, stop: float | None = None) -> Scan:
     best: tuple[int, Array, Array] | None = None
     strongest = 0.0
     previous, signal_before = np.full(4, np.nan), np.zeros((len(LOSSES), motors, 4))
-    last = count if stop is None else int(np.searchsorted(residual.time, stop))
-    for k in range(last):
+    for k in range(count):
         now, doubt = rho[k], residual.doubt[k]
         usable = np.isfinite(now) & np.isfinite(previous) & np.isfinite(doubt)
         signal = shapes * residual.command[k][None, :, None]

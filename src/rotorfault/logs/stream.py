@@ -15,7 +15,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.progress import Bar
 
 CHUNK = 1 << 20  # bytes that are read at once
-ROOM = 24 << 20  # bytes of one topic, beyond which every second row is dropped
+ROOM = 12 << 20  # bytes of one topic, beyond which every second row is dropped
 Step = Callable[[bytes, int, bool], int]
 """Takes bytes, where to begin and whether they are the last; says how far they were used."""
 

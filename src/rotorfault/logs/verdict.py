@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple, final
 
 from rotorfault.base.text_table import table_lines, terminal_width
+from rotorfault.logs.detectors import Said
 from rotorfault.logs.log import Log
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence
@@ -44,6 +45,8 @@ class LogDiagnosis:
         Of steady hover.
     own : tuple of str
         What the flight software itself said of motors.
+    detectors : tuple of Said
+        What the registered sources of diagnosis say, where the vehicle is known.
     """
 
     __slots__ = ("causes", "detectors", "limits", "log", "own", "scans", "trim", "verdict")
@@ -57,7 +60,7 @@ class LogDiagnosis:
         scans: tuple[Scan, ...] = (),
         trim: Evidence | None = None,
         own: tuple[str, ...] = (),
-        detectors: tuple[dict[str, Any], ...] = (),
+        detectors: tuple[Said, ...] = (),
     ) -> None:
         self.log, self.causes, self.verdict, self.limits = log, causes, verdict, limits
         self.scans, self.trim, self.own, self.detectors = scans, trim, own, detectors
@@ -106,7 +109,17 @@ class LogDiagnosis:
             "start": _rounded(self.log.start, 4),
             "duration": _rounded(self.log.duration, 4),
             "own_messages": list(self.own),
-            "detectors": list(self.detectors),
+            "detectors": [
+                {
+                    "detector": one.detector,
+                    "flags": [
+                        {"rotor": rotor, "time": _rounded(time), "loss": _rounded(loss)}
+                        for rotor, time, loss in one.flags
+                    ],
+                    "note": one.note,
+                }
+                for one in self.detectors
+            ],
         }
 
     def __str__(self) -> str:
@@ -119,7 +132,9 @@ class LogDiagnosis:
         table = [["", "cause", "evidence"], *rows]
         lines += table_lines(table, "><<", indent=2, rule=True, most=terminal_width())
         for title, items in (
-            ("its own messages", self.own), ("cannot tell", self.limits), ("read", self._read()),
+            ("its own messages", self.own),
+            ("registered sources of diagnosis", tuple(map(_said, self.detectors))),
+             ("cannot tell", self.limits), ("read", self._read()),
         ):  # fmt: skip
             if items:
                 lines += ["", f"{title}:", *(f"  - {item}" for item in items)]
@@ -129,6 +144,12 @@ class LogDiagnosis:
         damage = self.log.damage
         lost = (f"lost: {damage.reason}",) if damage.reason else ()
         return (*self.log.remarks, *lost)
+
+
+def _said(one: Said) -> str:
+    """What a source says, in a line."""
+    flags = ", ".join(f"rotor {rotor} from t = {time:.2f} s" for rotor, time, _ in one.flags) or "nobody"
+    return f"{one.detector}: {one.note}" if one.note and not one.flags else f"{one.detector} flags {flags}"
 
 
 def _named(cause: Cause) -> str:

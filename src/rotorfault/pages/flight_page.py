@@ -27,8 +27,8 @@ from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.pages.panels import Panel, derived, panels
 from rotorfault.pages.style import environment, script_data
 from rotorfault.pages.tracks import packed, packed_times, thinned
-from rotorfault.pages.verdict import headline
-from rotorfault.results.events import events, spins
+from rotorfault.pages.verdict import Fact, headline
+from rotorfault.results.events import Event, events, spins
 from rotorfault.results.flight_data import FlightData
 from rotorfault.results.flown import configuration_of, true_vehicle_file
 
@@ -45,6 +45,8 @@ class Shown(NamedTuple):
     data: FlightData
     rows: Sequence[tuple[str, str]] = ()  # label and text of each line of its summary
     source: str = ""  # the file, as commands are to name it; empty if there is none
+    facts: Sequence[Fact] | None = None  # of the headline, where it is not read off the scores
+    happened: Sequence[Event] | None = None  # the same of events
 
 
 def write_page(flights: Sequence[Shown], path: Path) -> Path:
@@ -84,7 +86,7 @@ def page(flights: Sequence[Shown]) -> str:
     return made.from_string((folder / "flight.html.j2").read_text(encoding="utf-8")).render(
         title=f"{names} · rotorfault",
         heading=names,
-        flights=[{"label": flight.label, "facts": headline(flight.data)} for flight in flights],
+        flights=[{"label": flight.label, "facts": _headline(flight)} for flight in flights],
         records=[_provenance(flight) for flight in flights],
         spins=any(spins(flight.data) for flight in flights),
         thinned=_thinned(payload),
@@ -92,6 +94,14 @@ def page(flights: Sequence[Shown]) -> str:
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
         program=Markup((folder / "bundle" / "flight.js").read_text(encoding="utf-8")),
     )  # fmt: skip
+
+
+def _headline(flight: Shown) -> Sequence[Fact]:
+    return headline(flight.data) if flight.facts is None else flight.facts
+
+
+def _happened(flight: Shown) -> Sequence[Event]:
+    return events(flight.data) if flight.happened is None else flight.happened
 
 
 def _label(flight: Shown, with_vehicle: bool) -> str:
@@ -117,7 +127,7 @@ def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
             {
                 "label": _short(flight.label),
                 "vehicle": _vehicle(data, file),
-                "events": [event._asdict() for event in events(flight.data)],
+                "events": [event._asdict() for event in _happened(flight)],
                 "panels": [_panel(panel) for panel in panels(data, _limits(data))],
                 "ground": _ground(data),
                 **track,

@@ -134,16 +134,17 @@ def _column(data: FlightData, curve: Curve) -> Array:
 
 
 def _motion(data: FlightData) -> Iterator[Panel]:
+    known = "logged" if "logged" in data.attrs else "true"
     for k, axis in enumerate(AXES):
         curves = (
-            Curve("position", k, "true", TRUE),
+            Curve("position", k, known, TRUE),
             Curve("position_estimated", k, "estimated", BELIEVED),
             Curve("position_reference", k, "desired", ASKED),
         )
         yield Panel(f"position.{axis}", "Motion", f"position {axis}", "m", _curves(data, *curves))
     for k, angle in enumerate(ANGLES):
         curves = (
-            Curve("attitude", k, "true", TRUE),
+            Curve("attitude", k, known, TRUE),
             Curve("attitude_estimated", k, "estimated", BELIEVED),
             Curve("controller.attitude_command", k, "command of the position loop", ASKED),
         )

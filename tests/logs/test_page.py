@@ -1,0 +1,61 @@
+"""The page of a diagnosed log, and the registered sources run over it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_logs import flown, log_of
+
+from rotorfault.base.errors import InputError
+from rotorfault.logs.api import write_pages
+from rotorfault.logs.detectors import order_of
+from rotorfault.logs.diagnose import diagnosis_of
+from rotorfault.logs.log import Log, Series, named_layout
+from rotorfault.logs.page import data_of
+from rotorfault.model.vehicle_file import load_vehicle
+
+
+def level(log: Log) -> Log:
+    """The log with a level attitude."""
+    time = log.series["command"].time
+    still = np.zeros((len(time), 4))
+    still[:, 0] = 1.0
+    return Log(log.source, log.kind, log.layout, {**log.series, "attitude": Series(time, still)})
+
+
+def test_a_page_has_the_verdict_and_the_evidence_against_each_rotor(tmp_path: Path) -> None:
+    found = diagnosis_of(log_of(flown(seed=1, rotor=2, loss=0.5, seconds=24.0), "my flight.ulg"))
+    (path,) = write_pages([found], tmp_path)
+    text = path.read_text(encoding="utf-8")
+    assert path.name == "my-flight.html"
+    assert "rotor 3 (front left) lost about 50%" in text
+    assert all(f"evidence_against_rotor_{k}" in text for k in range(1, 5))
+
+
+def test_belief_follows_evidence_and_both_begin_with_the_loss() -> None:
+    data = data_of(diagnosis_of(log_of(flown(seed=1, rotor=2, loss=0.5, seconds=24.0))))
+    time, belief = data["time"].values, data["diagnosis.belief"].values
+    assert belief[time < 19.0].max() < 0.01
+    assert belief[(time > 20.5) & (time < 23.0), 2].min() > 0.95
+    evidence = data["diagnosis.evidence_against_rotor_3"].values
+    assert (evidence[time < 19.0, 0] < evidence[time < 19.0, 1]).all()
+
+
+def test_registered_sources_name_the_motors_of_the_log() -> None:
+    log = level(log_of(flown(seed=2, rotor=1, loss=0.5, seconds=22.0, noise=0.002)))
+    found = diagnosis_of(log, vehicle="x500")
+    (said,) = [one for one in found.detectors if one.detector == "luenberger"]
+    assert [rotor for rotor, time, _ in said.flags if time > 29.0][:1] == [2]
+    assert found.json()["detectors"]
+
+
+def test_a_vehicle_whose_motors_are_elsewhere_is_refused() -> None:
+    log = log_of(flown(seed=2, seconds=4.0))
+    assert order_of(log, load_vehicle("crazyflie-2.1")) == [0, 1, 3, 2]
+    with pytest.raises(InputError, match="motors are not where"):
+        order_of(log, load_vehicle("hummingbird"))
+    hexa = Log("six", "made up", named_layout("hexa-x", ""), log.series)
+    with pytest.raises(InputError, match="has 6 motors"):
+        order_of(hexa, load_vehicle("x500"))
