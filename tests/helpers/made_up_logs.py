@@ -207,6 +207,8 @@ def mangled(content: bytes, seed: int) -> bytes:
     """A log with some of its bytes turned, moved, doubled or gone."""
     rng = np.random.default_rng(seed)
     out = bytearray(content)
+    if rng.random() < 0.2:
+        out[: int(rng.integers(1, 200))] = rng.bytes(int(rng.integers(0, 200)))
     for _ in range(int(rng.integers(1, 30))):
         at = int(rng.integers(0, max(len(out), 1)))
         size = int(rng.integers(1, 400))

@@ -17,6 +17,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt, lfilter
 
 from rotorfault.logs.commands import directions
@@ -123,7 +124,7 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     return Residual(blocks.edges[:-1], length, values, np.column_stack([doubt, up]), command, patterns, response)
 
 
-def _upset(log: Log, edges: Array) -> Array:
+def _upset(log: Log, edges: Array) -> NDArray[np.bool_]:
     """Blocks in which the vehicle is tilted so far that it no longer hovers, or has been in the last second."""
     attitude = log.series.get("attitude")
     if attitude is None:
@@ -132,8 +133,7 @@ def _upset(log: Log, edges: Array) -> Array:
     upright = (w * w - x * x - y * y + z * z) / np.maximum(w * w + x * x + y * y + z * z, 1e-12)
     over = upright < math.cos(UPSET)
     width = int(1.0 / (edges[1] - edges[0])) + 1
-    recent: Array = np.convolve(over, np.ones(width))[: len(over)] > 0.0
-    return recent
+    return np.asarray(np.convolve(over, np.ones(width))[: len(over)] > 0.0)
 
 
 def _blocks(log: Log, edges: Array) -> _Blocks:
