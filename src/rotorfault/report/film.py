@@ -7,6 +7,7 @@ second, so the pictures of one have unequal durations that add up.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from numbers import Integral, Real
 from pathlib import Path
@@ -101,8 +102,10 @@ def write_film(data: FlightData, label: str, path: Path, film: Film) -> None:
     """
     film = film.checked(require_kind(path))
     times, ending = moments(data, film), path.suffix.lower()
-    animation = Animation(data, label, film.width, film.speed)
-    with Bar("drawing", len(times), "pictures") as bar:
+    with warnings.catch_warnings(), Bar("drawing", len(times), "pictures") as bar:
+        # A letter that the font lacks is drawn as a box, which says as much.
+        warnings.filterwarnings("ignore", message="Glyph")
+        animation = Animation(data, label, film.width, film.speed)
 
         def pictures() -> Iterator[NDArray[np.uint8]]:
             last = -1.0
