@@ -300,12 +300,13 @@ def flight_page() -> bytes:
         options += ["--no-sandbox"] if sys.platform == "linux" else []
         browser = tools.chromium.launch(executable_path=shutil.which("chromium"), args=options)
         shown = browser.new_page(viewport={"width": 1200, "height": 900})
-        shown.goto(page.as_uri())
+        shown.goto(page.as_uri() + "#t=1.95")
         shown.wait_for_timeout(2500)
         drawn = Image.open(io.BytesIO(shown.screenshot())).convert("RGB").resize((900, 675))
         browser.close()
     out = io.BytesIO()
-    drawn.quantize(64, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
+    # So that small arrows and signs keep their colours.
+    drawn.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(out, "PNG", optimize=True)
     return out.getvalue()
 
 

@@ -52,8 +52,6 @@ class Flight {
     this.index = index;
     this.end = time[time.length - 1];
     this.start = time[0];
-    const rates = signals.body_rates ?? { low: [], high: [] };
-    this.spins = Math.max(0, ...[...rates.low, ...rates.high].map(Math.abs)) > 2 * Math.PI; // more than a turn a second
   }
 
   has(name) {

@@ -88,7 +88,7 @@ def page(flights: Sequence[Shown]) -> str:
         heading=names,
         flights=[{"label": flight.label, "facts": _headline(flight)} for flight in flights],
         records=[_provenance(flight) for flight in flights],
-        spins=any(spins(flight.data) for flight in flights),
+        spins=any(flight["spins"] for flight in payload["flights"]),
         thinned=_thinned(payload),
         data=script_data(payload),
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
@@ -130,6 +130,7 @@ def _payload(flights: Sequence[Shown]) -> dict[str, Any]:
                 "events": [event._asdict() for event in _happened(flight)],
                 "panels": [_panel(panel) for panel in panels(data, _limits(data))],
                 "ground": _ground(data),
+                "spins": spins(data),
                 **track,
             }
             for flight, (data, file), (track, _) in zip(flights, whole, tracks, strict=True)
