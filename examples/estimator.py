@@ -9,6 +9,9 @@ from rotorfault.autopilot.estimation.protocol import required
 from rotorfault.maths.scalar import Scalar, exp
 
 
+READ = "position", "velocity", "attitude", "rates", "specific_force"
+
+
 class Bandwidth(NamedTuple):
     velocity: Scalar  # rad/s
 
@@ -40,7 +43,7 @@ class VelocityFilter(rf.Estimator[Memory, Bandwidth]):
         return Memory(inputs.readings.velocity.value)
 
     def step(self, memory, inputs, parameters, dt):
-        readings = [required(inputs.readings, name, "velocity filter").value for name in rf.Readings._fields]
+        readings = [required(inputs.readings, name, "velocity filter").value for name in READ]
         position, velocity, attitude, rates, force = readings
         acceleration = attitude.matrix() @ force - rf.Vec3(0.0, 0.0, inputs.vehicle.gravity)
         predicted = memory.v_W + acceleration * dt
