@@ -8,7 +8,6 @@ import rotorfault as rf
 from rotorfault.autopilot.estimation.protocol import required
 from rotorfault.maths.scalar import Scalar, exp
 
-
 READ = "position", "velocity", "attitude", "rates", "specific_force"
 
 
