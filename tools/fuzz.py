@@ -1,7 +1,9 @@
 """Fuzz all doors of the program and print counts: `make fuzz`.
 
 Inputs of each kind are drawn in blocks; a block's seed makes the same inputs again, so that a failure is repeated by
-``tools/fuzz.py --kind KIND --first SEED --blocks 1``. Exit code 1 if anything failed.
+``tools/fuzz.py --kind KIND --first SEED --blocks 1``. Kinds take turns, block by block, so that a run that is cut
+short has tried them all; Ctrl-C prints what has been counted, and the seed to go on from. Exit code 1 if anything
+failed.
 """
 
 from __future__ import annotations
@@ -93,17 +95,24 @@ def main() -> int:
     faulthandler.enable()
     warnings.simplefilter("ignore")
     failures: dict[str, str] = {}
-    print(f"{'kind':12}" + "".join(f"{name:>10}" for name in COLUMNS) + f"{'s':>8}", flush=True)
-    total: collections.Counter[str] = collections.Counter()
-    for name in kinds:
-        counts: collections.Counter[str] = collections.Counter()
-        start = time.monotonic()
-        for number in range(chosen.first, chosen.first + blocks):
-            fuzz(KINDS[name], number, counts, failures)
-        total += counts
-        numbers = "".join(f"{counts[column]:10}" for column in COLUMNS)
-        print(f"{name:12}{numbers}{time.monotonic() - start:8.0f}", flush=True)
-    print(f"{'all':12}" + "".join(f"{total[column]:10}" for column in COLUMNS))
+    counts = {name: collections.Counter[str]() for name in kinds}
+    spent = dict.fromkeys(kinds, 0.0)
+    for number in range(chosen.first, chosen.first + blocks):
+        try:
+            for name in kinds:
+                start = time.monotonic()
+                fuzz(KINDS[name], number, counts[name], failures)
+                spent[name] += time.monotonic() - start
+        except KeyboardInterrupt:
+            print(f"interrupted: go on with --first {number}", file=sys.stderr)
+            break
+        tried = sum(map(collections.Counter.total, counts.values()))
+        print(f"seed {number}: {tried} inputs, {sum(c['failed'] for c in counts.values())} failed", file=sys.stderr)
+    print(f"{'kind':12}" + "".join(f"{name:>10}" for name in COLUMNS) + f"{'s':>8}")
+    counts["all"] = sum(counts.values(), collections.Counter())
+    spent["all"] = sum(spent.values())
+    for name, count in counts.items():
+        print(f"{name:12}" + "".join(f"{count[column]:10}" for column in COLUMNS) + f"{spent[name]:8.0f}")
     for key, told in failures.items():
         print(f"\n{key}\n  {told}")
     return 1 if failures else 0

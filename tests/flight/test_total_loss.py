@@ -70,3 +70,21 @@ def test_yaw_that_is_held_is_held_to_the_last_bit() -> None:
         for choice in ("relaxed", "upright")
     )
     np.testing.assert_array_equal(one.data["position"], other.data["position"])
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("law", ["roismc", "smc"])
+@pytest.mark.parametrize("share", [0.4, 1.5, 1.75])
+def test_no_rotor_that_is_stuck_costs_the_flight(law: str, share: float) -> None:
+    """None is lost, stuck low or high, whether the law has weights of its own or gains alone."""
+    weight = rf.load_vehicle("crazyflie-2.1").vehicle
+    stuck = {
+        "vehicle": "crazyflie-2.1",
+        "controller": {"kind": law, "preset": "gentle"},
+        "duration": 4.0,
+        "wind": {"kind": "dryden", "wind_at_6m": 5.0},
+        "fault": [{"kind": "stuck", "rotor": 2, "time": 1.0, "thrust": share * weight.mass * weight.gravity / 4.0}],
+    }
+    found = rf.fly_many("hover-fault", {"seed": list(range(8))}, settings=stuck).table.to_pandas()
+    assert found["survived"].all(), found["outcome"].tolist()

@@ -27,6 +27,8 @@ M = TypeVar("M", bound=BaseModel)
 LONGEST_TEXT = 64_000_000
 """Bytes of a text file: a table of a million rows with all columns has about as many."""
 
+LARGEST_WHOLE = 2**63
+
 Three = tuple[float, float, float]
 """Three numbers, one per axis."""
 
@@ -66,6 +68,7 @@ class Strict(BaseModel):
                 if key not in allowed and key not in cls.model_fields:
                     raise refusal(str(key), f"unknown key{nearest(key, allowed)} ({choices(allowed)})")
                 _require_plain(str(key), data[key])
+                _require_whole(str(key), data[key])
         return data
 
 
@@ -79,6 +82,16 @@ def _require_plain(key: str, value: Any) -> None:
         if isinstance(text, str) and printable(text, kept) != text:
             one = "" if kept else ", in one line"
             raise refusal(key, f"got {short(text)}; allowed: a text without control characters{one}")
+
+
+def _require_whole(key: str, value: Any) -> None:
+    """Refuse a whole number that no file holds: TOML has 64 bits for one, and Python writes 4300 digits at most."""
+    if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
+        raise refusal(key, f"got {short(value)}; allowed: whole numbers of up to 64 bits, less than 9.3e18")
+    # What is nested in a configuration of its own is looked at there.
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ():
+        if isinstance(inner, int):
+            _require_whole(key, inner)
 
 
 def explain(error: ValidationError, where: str, data: Any = None, keys: bool = False) -> str:

@@ -6,26 +6,36 @@ import math
 
 import numpy as np
 import pytest
+import scipy.linalg
+from cascade_step import cascade
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rotorfault.analysis.relaxed_hover import relaxed_hover
+from rotorfault.autopilot.allocation.available import least_in_balance
 from rotorfault.autopilot.control.relaxed import (
     RelaxedAxis,
     RelaxedParameters,
     SpinWeights,
+    ThrustRange,
     TurningError,
     at_rest,
+    attainable,
     relaxed_axis,
     relaxed_parameters,
     relaxed_torque,
+    weights_of_gains,
 )
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.aerodynamics import still_air
+from rotorfault.model.block import Context
 from rotorfault.model.motion import angular_acceleration
-from rotorfault.model.signals import healthy
+from rotorfault.model.signals import Stuck, Wrench, healthy
 from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds, wrench_of
 from rotorfault.model.vehicle_file import load_vehicle
 
 WEIGHTS = SpinWeights(6e4, 10.0)
+NO_BALANCE = ThrustRange(0.0, 0.0)
 
 
 def mueller() -> Vehicle:
@@ -41,7 +51,7 @@ def axis_of(
     believed = healthy(4)._replace(loss=loss)
     memory = at_rest(parameters, vehicle)
     for _ in range(steps):
-        axis = relaxed_axis(memory, vehicle, believed, 0.0, omega, residual, parameters, 1e-3)
+        axis = relaxed_axis(memory, vehicle, believed, NO_BALANCE, omega, residual, parameters, 1e-3)
         memory = axis.memory
     return axis
 
@@ -72,7 +82,7 @@ def test_in_balance_nothing_but_the_balance_is_asked_for() -> None:
     # The axis put exactly where hover has it.
     lean = Vec3(hover.axis_B.x / hover.axis_B.z, hover.axis_B.y / hover.axis_B.z, 0.0)
     axis = relaxed_axis(
-        axis.memory._replace(lean=lean), vehicle, healthy(4), 0.0, hover.omega_B, residual, parameters, 0.0
+        axis.memory._replace(lean=lean), vehicle, healthy(4), NO_BALANCE, hover.omega_B, residual, parameters, 0.0
     )
     given = wrench_of(vehicle, hover.thrust).torque_B
     error = TurningError(zeros(), axis.to_B.T @ hover.omega_B, zeros(), zeros())
@@ -86,11 +96,18 @@ def test_with_yaw_in_balance_nothing_is_given_up() -> None:
     vehicle = mueller()
     parameters = relaxed_parameters(0.3, 0.35, 0.5, WEIGHTS)
     weight = float(vehicle.mass * vehicle.gravity)
-    for with_yaw, given_up in ((2.0 * weight, 0.0), (weight, 0.0), (0.975 * weight, 0.5), (0.0, 1.0)):
+    cases = (
+        ((0.0, 2.0), 0.0), ((0.0, 1.0), 0.0), ((0.0, 0.975), 0.5), ((0.0, 0.0), 1.0),
+        ((1.0, 2.0), 0.0), ((1.025, 2.0), 0.5), ((1.5, 2.0), 1.0),
+    )  # fmt: skip
+    for shares, given_up in cases:
+        with_yaw = ThrustRange(*(share * weight for share in shares))
         axis = relaxed_axis(
             at_rest(parameters, vehicle), vehicle, healthy(4), with_yaw, Vec3(0.0, 0.0, 20.0), 0.0, parameters, 1e-3
         )
         assert float(axis.given_up) == pytest.approx(given_up, abs=1e-12)
+        # Beside too much thrust the spin is braked, beside too little it is let go.
+        assert float(axis.free) == (0.0 if shares[1] >= 1.0 else pytest.approx(given_up))
         if given_up == 0.0:
             assert [*axis.to_B] == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
@@ -103,5 +120,54 @@ def test_the_axis_stays_within_its_limit_and_is_finite_at_rest() -> None:
         lean = math.hypot(axis.memory.lean.x, axis.memory.lean.y)
         assert lean <= math.tan(0.2) + 1e-12
     dead = healthy(4)._replace(loss=PerRotor.all(1.0))
-    none = relaxed_axis(at_rest(parameters, vehicle), vehicle, dead, 0.0, Vec3(0.0, 0.0, 5.0), 0.0, parameters, 1e-3)
+    none = relaxed_axis(
+        at_rest(parameters, vehicle), vehicle, dead, NO_BALANCE, Vec3(0.0, 0.0, 5.0), 0.0, parameters, 1e-3
+    )
     assert all(np.isfinite([*none.to_B]))
+
+
+@pytest.mark.parametrize("stuck_at", [1.2, 1.5, 2.2])
+def test_beside_a_rotor_stuck_high_the_others_carry_what_is_left_and_balance_it(stuck_at: float) -> None:
+    """Level where they can; where the rotor opposite cannot keep up, about an axis that leans."""
+    vehicle = load_vehicle("crazyflie-2.1").vehicle
+    hover = float(vehicle.mass * vehicle.gravity) / 4.0
+    believed = healthy(4)._replace(
+        stuck=Stuck(PerRotor(0.0, 1.0, 0.0, 0.0), PerRotor(0.0, stuck_at * hover, 0.0, 0.0))
+    )
+    least = float(least_in_balance(vehicle, believed.loss, believed.stuck))
+    assert least == pytest.approx(4.0 * stuck_at * hover)
+    parameters = relaxed_parameters(0.3, 0.35, 0.1, WEIGHTS)
+    memory, spin = at_rest(parameters, vehicle), Vec3(0.0, 0.0, -25.0)
+    for _ in range(3000):
+        axis = relaxed_axis(memory, vehicle, believed, ThrustRange(least, 9.0), spin, 0.0, parameters, 1e-3)
+        memory = axis.memory
+    assert float(axis.given_up) == 1.0
+    # The rotors beside it give what the two of the pair leave: without a third of an equal share the axis leans.
+    left = 2.0 - stuck_at
+    assert (math.hypot(axis.memory.lean.x, axis.memory.lean.y) < 1e-5) == (left > 0.3 * (4.0 - stuck_at) / 3.0)
+    # No demand of the tilt is beyond what the three can do.
+    asked = Wrench(4.0 * hover, Vec3(0.02, -0.01, 0.0))
+    given = attainable(vehicle, believed, asked)
+    assert abs(given.torque_B.x) < 0.02
+    assert given.thrust > 0.0
+
+
+@given(k1=st.floats(1.0, 2000.0), damping=st.floats(0.71, 5.0))
+def test_the_weights_of_gains_have_these_gains_for_their_optimum(k1: float, damping: float) -> None:
+    k2 = 2.0 * damping * math.sqrt(k1)
+    weights = weights_of_gains(Vec3(k1, k1, 0.0), Vec3(k2, k2, 0.0))
+    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    P = scipy.linalg.solve_continuous_are(A, B, np.diag([float(weights.angle), float(weights.rate)]), np.eye(1))
+    np.testing.assert_allclose(P[1], [k1, k2], rtol=1e-6)
+
+
+def test_less_damping_than_any_weights_give_is_taken_for_the_least_that_they_do() -> None:
+    assert weights_of_gains(Vec3(100.0, 100.0, 0.0), Vec3(2.0, 2.0, 0.0)) == (1e4, 0.0)
+
+
+@pytest.mark.parametrize("name", ["smc", "ismc", "sdre", "roismc"])
+def test_every_law_has_weights_for_a_body_that_spins(name: str) -> None:
+    made = cascade(name)
+    weights = made.parameters(Context(load_vehicle("paper").vehicle, 1e-3)).relaxed.weights
+    assert weights.angle > 0.0
+    assert weights.rate >= 0.0

@@ -61,3 +61,15 @@ def thrusts_in_balance(vehicle: Vehicle, loss: PerRotor, stuck: Stuck | None = N
     most = in_pairs(vehicle, high)
     S12, S34 = 2.0 * minimum(most.r1, most.r2), 2.0 * minimum(most.r3, most.r4)
     return 2.0 * minimum(S12, S34), S12 + S34
+
+
+def least_in_balance(vehicle: Vehicle, loss: PerRotor, stuck: Stuck) -> Scalar:
+    """Least total thrust in N with yaw in balance; parameters as of `thrust_available`.
+
+    A rotor that is stuck at H_i asks for as much of the one opposite, and with yaw in balance for as much of the
+    other pair. Other frames than quadrotors in pairs have rotors to spare for that: of them it is 0.
+    """
+    if vehicle.pairs == ():
+        return 0.0
+    low = in_pairs(vehicle, effect_of(vehicle, loss, stuck) * vehicle.thrust_min + stuck.thrust)
+    return 4.0 * maximum(maximum(low.r1, low.r2), maximum(low.r3, low.r4))

@@ -98,7 +98,7 @@ class CascadeSettings(Strict):
     yaw_lost: YawLost = Field(
         default="relaxed",
         description="where yaw cannot be held: relaxed: spins about an axis that leaves its rotors room | upright: "
-        "about body z; laws without weights, and `euler`, are always upright",
+        "about body z; `euler` is always upright",
     )
     # Less leaves the rotor opposite a dead one no thrust to take back, more costs thrust.
     relaxed_reserve: float = Field(
@@ -216,7 +216,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         available = inputs.thrust_available
         if memory.relaxed != ():
             spinning = Spinning(cast("RelaxedMemory", memory.relaxed), parameters.relaxed, inputs, dt)
-            available = spinning.available
+            available = spinning.available(parameters.thrust_share)
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
         position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))

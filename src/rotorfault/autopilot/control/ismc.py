@@ -27,6 +27,7 @@ from rotorfault.autopilot.control.integral_sliding import (
     start,
 )
 from rotorfault.autopilot.control.protocol import Law, LawMemory, LawOutput, SlidingSignals, TrackingError
+from rotorfault.autopilot.control.relaxed import SpinWeights, weights_of_gains
 from rotorfault.base.config import Strict, Three
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar
@@ -103,6 +104,10 @@ class Ismc(Law[IsmcParameters]):
         """sigma(0) = 0 on all axes."""
         return LawMemory(start(position.rate), start(attitude.rate))
 
+    def spin_weights(self, parameters: IsmcParameters) -> SpinWeights:
+        """Those for which the gain N is optimal."""
+        return weights_of_gains(parameters.attitude_error, parameters.attitude_rate)
+
     def position(
         self, memory: Surface, error: TrackingError, parameters: IsmcParameters, dt: Scalar
     ) -> tuple[Surface, LawOutput]:
@@ -127,4 +132,6 @@ class Ismc(Law[IsmcParameters]):
         surface, u, sigma = add_switching(
             memory, error, feedback, gains, self.settings.nominal, self.settings.switching, dt
         )
-        return surface, LawOutput(u, Mat3.diagonal(k1), Mat3.diagonal(k2), sigma, outside_layer(sigma, gains))
+        return surface, LawOutput(
+            u, Mat3.diagonal(k1), Mat3.diagonal(k2), sigma, outside_layer(sigma, gains), switching=u - feedback
+        )

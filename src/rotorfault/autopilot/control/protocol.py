@@ -7,10 +7,11 @@ makes a controller of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple
 
-from rotorfault.autopilot.allocation.available import thrust_available, thrusts_in_balance
+from rotorfault.autopilot.allocation.available import least_in_balance, thrust_available, thrusts_in_balance
 from rotorfault.autopilot.control.relaxed import SpinWeights
 from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Prediction
@@ -41,7 +42,8 @@ class ControlInputs(NamedTuple):
     prediction: Prediction
     residual_speed: Scalar | Vec3  # rad/s, believed overall residual rotor speed Omega of (4)
     thrust_available: Scalar  # N: largest total thrust of the believed rotors in balance
-    thrust_with_yaw: Scalar = 0.0  # N: the same with yaw in balance, whatever the weight
+    thrust_with_yaw: Scalar = math.inf  # N: the same with yaw in balance, whatever the weight
+    least_with_yaw: Scalar = 0.0  # N: the least total thrust with yaw in balance; more than 0 with a rotor stuck high
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -89,6 +91,7 @@ def _inputs(instant: Instant) -> ControlInputs:
         thrust_available=thrust_available(instant.vehicle, believed.loss, believed.stuck),
         # Who is to spin has none.
         thrust_with_yaw=with_yaw if isinstance(spin, tuple) else with_yaw * (1.0 - spin),
+        least_with_yaw=least_in_balance(instant.vehicle, believed.loss, believed.stuck),
     )
 
 

@@ -21,8 +21,11 @@ rate and the angular acceleration that the lagging rotors give, with the weights
 What it leaves to feed-forward is the balance of the turning itself, with the believed inertia as it is; the switching
 input of the sliding surface is added as elsewhere.
 
+Rotors that are stuck give what they give: the others carry the rest of the weight and balance their tilt torque.
+
 **When.** How much of yaw is given up goes from 0 to 1 as the thrust that believed rotors have with yaw in balance
-falls from the weight to `YAW_LOST` of it. The torque is shared between the law that holds yaw and this one in that
+falls from the weight to `YAW_LOST` of it, or the least that they have so, with a rotor stuck high, rises as far
+above it. The torque is shared between the law that holds yaw and this one in that
 ratio, and the axis moves from z to n with the time constant `relaxed_time`, so nothing jumps.
 """
 
@@ -52,6 +55,7 @@ YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that hold
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 RIDGE = 1e-6  # relative
 MOST = 10.0  # of the weight: more thrust than is ever asked for
+LEAST_CARRIED = 0.1  # of the weight
 
 
 class SpinWeights(NamedTuple):
@@ -59,6 +63,31 @@ class SpinWeights(NamedTuple):
 
     angle: Scalar  # 1/s^4: q of the angle over r
     rate: Scalar  # 1/s^2: q of the rate over r
+
+
+def weights_of_gains(angle: Vec3, rate: Vec3) -> SpinWeights:
+    """Weights of a law that has gains and no weights: those for which its gains are optimal.
+
+    Of a double integrator u = -k1 e - k2 w is optimal for :math:`q_e = k_1^2` and :math:`q_w = k_2^2 - 2k_1` over r
+    (Kalman, "When is a linear control system optimal?", J. Basic Eng. 86, 1964). A damping ratio below 0.71 is
+    optimal for no weights; it is taken for 0.71 at the same natural frequency.
+
+    Parameters
+    ----------
+    angle : Vec3, 1/s^2
+        k1 of roll, pitch, yaw.
+    rate : Vec3, 1/s
+        k2 of the same.
+    """
+    k1, square = angle.times(angle), rate.times(rate) - angle * 2.0
+    return SpinWeights((k1.x + k1.y) * 0.5, (maximum(square.x, 0.0) + maximum(square.y, 0.0)) * 0.5)
+
+
+class ThrustRange(NamedTuple):
+    """Least and largest total thrust."""
+
+    least: Scalar  # N
+    most: Scalar  # N
 
 
 class RelaxedParameters(NamedTuple):
@@ -82,6 +111,7 @@ class RelaxedAxis(NamedTuple):
 
     memory: RelaxedMemory
     given_up: Scalar  # 0 to 1: share of yaw
+    free: Scalar  # 0 to 1: share of it that is not even braked
     thrust: Scalar  # N: most that the believed rotors give together in the balance of the axis
     to_B: Mat3  # from the frame with n for its z axis to the body's
     turn: Quat  # the same
@@ -124,7 +154,7 @@ def relaxed_axis(
     memory: RelaxedMemory,
     vehicle: Vehicle,
     believed: Diagnosis,
-    with_yaw: Scalar,
+    with_yaw: ThrustRange,
     omega_B: Vec3,
     residual_speed: Scalar | Vec3,
     parameters: RelaxedParameters,
@@ -139,8 +169,8 @@ def relaxed_axis(
         As believed.
     believed : Diagnosis
         Of its rotors.
-    with_yaw : scalar, N
-        Thrust that the believed rotors have with yaw in balance.
+    with_yaw : ThrustRange, N
+        Thrusts that the believed rotors have with yaw in balance.
     omega_B : Vec3, rad/s
         Body rates.
     residual_speed : scalar, rad/s
@@ -149,9 +179,28 @@ def relaxed_axis(
     dt : scalar, s
         Sampling period.
     """
+<<<<<<< HEAD
     given_up = yaw_given_up(vehicle, with_yaw)
     most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
     tau = wrench_of(vehicle, balance).torque_B
+=======
+    weight = vehicle.mass * vehicle.gravity
+    # As far above the weight as below it.
+    free = yaw_given_up(vehicle, with_yaw.most)
+    given_up = maximum(free, yaw_given_up(vehicle, 2.0 * weight - with_yaw.least))
+    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
+    held = wrench_of(vehicle, believed.stuck.thrust)
+    # A rotor that is stuck alone may carry more than the weight; the floor leaves the others something to share.
+    carried = maximum(weight - held.thrust, LEAST_CARRIED * weight)
+    balance = _balanced_thrust(vehicle, able, Wrench(carried, -held.torque_B), parameters.reserve)
+
+    def room(most: Scalar, thrust: Scalar) -> Scalar:
+        # A dead rotor bounds nothing.
+        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
+
+    most = held.thrust + able.map(room, balance).reduce(minimum) * carried
+    tau = wrench_of(vehicle, balance).torque_B + held.torque_B
+>>>>>>> 334168f (Steer a spinning body by all laws, beside a rotor stuck high too; refuse whole numbers beyond 64 bits; let fuzzed kinds take turns)
     wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
@@ -168,7 +217,7 @@ def relaxed_axis(
         -x, -y, z,
     )  # fmt: skip
     turn = Quat(w, -y * half, x * half, 0.0)
-    return RelaxedAxis(memory._replace(lean=lean), given_up, most, to_B, turn)
+    return RelaxedAxis(memory._replace(lean=lean), given_up, free, most, to_B, turn)
 
 
 def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:
@@ -185,6 +234,7 @@ def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:
     return clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
 
 
+<<<<<<< HEAD
 def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> tuple[Scalar, PerRotor]:
     """Most thrust in N that the believed rotors give together in the balance of the spin, and thrusts at the weight.
 
@@ -210,11 +260,15 @@ def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> t
 
 def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:
     """Thrusts in N with which the believed rotors carry the weight, each living one with its reserve."""
+=======
+def _balanced_thrust(vehicle: Vehicle, able: PerRotor, left: Wrench, reserve: Scalar) -> PerRotor:
+    """Thrusts in N with which the rotors that follow give what stuck ones leave, each living one with its reserve."""
+>>>>>>> 334168f (Steer a spinning body by all laws, beside a rotor stuck high too; refuse whole numbers beyond 64 bits; let fuzzed kinds take turns)
     weight = vehicle.mass * vehicle.gravity
     # Where nothing lives the sum is 0; the floor keeps the quotient a number.
     most = able.sum() if vehicle.tilt == () else able.dot(effectiveness(vehicle).thrust)
-    alike: PerRotor = able * (weight / maximum(most, 1e-3 * weight))
-    level = _thrusts_for(vehicle, able, Wrench(weight, zeros()))
+    alike: PerRotor = able * (left.thrust / maximum(most, 1e-3 * weight))
+    level = _thrusts_for(vehicle, able, left)
     short, room = alike * reserve - level, alike - level
     share = short.map(lambda lacks, r: select(greater(lacks, 0.0), lacks / maximum(r, 1e-9 * weight), 0.0), room)
     push = minimum(share.reduce(maximum), 1.0)

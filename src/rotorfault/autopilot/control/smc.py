@@ -21,6 +21,7 @@ from pydantic import Field, field_validator
 
 from rotorfault.autopilot.control.integral_sliding import Switching
 from rotorfault.autopilot.control.protocol import Law, LawOutput, SlidingSignals, TrackingError
+from rotorfault.autopilot.control.relaxed import SpinWeights, weights_of_gains
 from rotorfault.autopilot.control.riccati import position_gain
 from rotorfault.autopilot.control.sdre import Weights, position_gains, sdre_parameters
 from rotorfault.base.config import Strict, Three
@@ -152,6 +153,12 @@ class Smc(Law[SmcParameters]):
                 for s in (self.settings.position, self.settings.attitude)
             )
         )
+
+    def spin_weights(self, parameters: SmcParameters) -> SpinWeights:
+        """Those for which the law in its boundary layer is optimal; of the form with sgn, those of the smooth one."""
+        slope, reaching, K, layer = parameters.attitude
+        steep = reaching + K / layer
+        return weights_of_gains(steep.times(slope), slope + steep)
 
     def position(
         self, memory: Nothing, error: TrackingError, parameters: SmcParameters, dt: Scalar

@@ -10,6 +10,7 @@ from rotorfault.autopilot.control.protocol import ControlInputs
 from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
     RelaxedParameters,
+    ThrustRange,
     TurningError,
     attainable,
     relaxed_axis,
@@ -49,7 +50,7 @@ class Spinning:
             memory,
             inputs.vehicle,
             inputs.diagnosis,
-            inputs.thrust_with_yaw,
+            ThrustRange(inputs.least_with_yaw, inputs.thrust_with_yaw),
             estimate.omega_B,
             inputs.residual_speed,
             parameters,
@@ -57,11 +58,17 @@ class Spinning:
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
 
-    @property
-    def available(self) -> Scalar:
-        """Largest thrust in N that position control should ask for: that in balance, level or about the axis."""
+    def available(self, share: Scalar) -> Scalar:
+        """Largest thrust in N that position control should ask for: that in balance, level or about the axis.
+
+        Parameters
+        ----------
+        share : scalar
+            Of it that position control takes. Yaw is given up for the reserve above the weight, so that is whole.
+        """
         inputs = self.inputs
-        most = minimum(self.axis.thrust, HOVER_RESERVE * inputs.vehicle.mass * inputs.vehicle.gravity)
+        weight = inputs.vehicle.mass * inputs.vehicle.gravity
+        most = minimum(self.axis.thrust, HOVER_RESERVE * weight / share)
         return maximum(inputs.thrust_available, most * self.axis.given_up)
 
     def track(
@@ -78,13 +85,11 @@ class Spinning:
         )
         held = 1.0 - axis.given_up
 
-        def in_body(v: Vec3, free: Scalar) -> Vec3:
-            return axis.to_B @ Vec3(v.x, v.y, v.z * held + free * axis.given_up)
-
+        rate = turn.rate.z + (self.omega.z - turn.rate.z) * axis.free
         return turn._replace(
-            e=in_body(turn.e, 0.0),
-            rate=in_body(turn.rate, self.omega.z),
-            acceleration=in_body(turn.acceleration, 0.0),
+            e=axis.to_B @ Vec3(turn.e.x, turn.e.y, turn.e.z * held),
+            rate=axis.to_B @ Vec3(turn.rate.x, turn.rate.y, rate),
+            acceleration=axis.to_B @ Vec3(turn.acceleration.x, turn.acceleration.y, turn.acceleration.z * held),
         )
 
     def steer(self, upright: Wrench, given_B: Vec3, switching_B: Vec3) -> tuple[RelaxedMemory, Wrench]:
@@ -109,5 +114,9 @@ class Spinning:
         relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
         beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(inputs.vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
-        held = 1.0 - given_up
-        return after, Wrench(upright.thrust, upright.torque_B * held + relaxed_B * given_up)
+        # About yaw what is attainable beside a rotor stuck high is its own: asked for that, it could never show that
+        # it is stuck. So the spin is braked there, which costs nothing: yaw is served last.
+        free = minimum(self.axis.free, given_up)
+        tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
+        yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
+        return after, Wrench(upright.thrust, Vec3(tilt_B.x, tilt_B.y, yaw))

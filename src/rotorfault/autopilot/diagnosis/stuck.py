@@ -24,19 +24,12 @@ judged.
 One rotor is judged at a time, that which was flagged first of those that are: what is flagged later is often sound,
 and blamed for what the first does. Where three or four are flagged, no two of them are sound, or something that is no
 rotor pushes (the ground); then what a rotor gives is not known, and none is believed stuck.
-
-A rotor stuck so high leaves no balance: it and its partner, which has to give as much, lift more than the vehicle
-weighs, and the other two are left without a thrust by which to turn it. With the reserve that position control keeps
-below the weight (`rotorfault.autopilot.allocation.available`), kept here above it, that is from
-:math:`2F > mg/1.2` on. Nothing can be made of such a belief, and allocation that takes it at its word gives up what
-still worked: it is not acted on.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from rotorfault.autopilot.allocation.available import HOVER_RESERVE
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, both, clip, either, greater_equal, less, maximum, negated, select
 from rotorfault.model.signals import Stuck
@@ -123,8 +116,7 @@ def judged(
     g = clip(product / maximum(square, 1e-9 * bar), 0.0, 1.0)
     missed = given * given - g * (2.0 * product - g * square)
     known = less(seen.flagged.sum(), 2.5)
-    of_use = less(given, (0.5 * len(seen.thrust) / HOVER_RESERVE) * hover)
-    is_stuck = both(both(settled, both(known, of_use)), less(bar, missed))
+    is_stuck = both(both(settled, known), less(bar, missed))
     stuck = which.map(lambda it: both(it, is_stuck))
     held = maximum(given, 0.0)
     after = StuckMemory(which, since, late, given, product, square)
