@@ -179,28 +179,12 @@ def relaxed_axis(
     dt : scalar, s
         Sampling period.
     """
-<<<<<<< HEAD
-    given_up = yaw_given_up(vehicle, with_yaw)
-    most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
-    tau = wrench_of(vehicle, balance).torque_B
-=======
     weight = vehicle.mass * vehicle.gravity
     # As far above the weight as below it.
     free = yaw_given_up(vehicle, with_yaw.most)
     given_up = maximum(free, yaw_given_up(vehicle, 2.0 * weight - with_yaw.least))
-    able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
-    held = wrench_of(vehicle, believed.stuck.thrust)
-    # A rotor that is stuck alone may carry more than the weight; the floor leaves the others something to share.
-    carried = maximum(weight - held.thrust, LEAST_CARRIED * weight)
-    balance = _balanced_thrust(vehicle, able, Wrench(carried, -held.torque_B), parameters.reserve)
-
-    def room(most: Scalar, thrust: Scalar) -> Scalar:
-        # A dead rotor bounds nothing.
-        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
-
-    most = held.thrust + able.map(room, balance).reduce(minimum) * carried
-    tau = wrench_of(vehicle, balance).torque_B + held.torque_B
->>>>>>> 334168f (Steer a spinning body by all laws, beside a rotor stuck high too; refuse whole numbers beyond 64 bits; let fuzzed kinds take turns)
+    most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
+    tau = wrench_of(vehicle, balance).torque_B
     wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
@@ -234,7 +218,6 @@ def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:
     return clip((1.0 - with_yaw / weight) * (1.0 / (1.0 - YAW_LOST)), 0.0, 1.0)
 
 
-<<<<<<< HEAD
 def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> tuple[Scalar, PerRotor]:
     """Most thrust in N that the believed rotors give together in the balance of the spin, and thrusts at the weight.
 
@@ -249,21 +232,21 @@ def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> t
     """
     weight = vehicle.mass * vehicle.gravity
     able = effect_of(vehicle, believed.loss, believed.stuck) * vehicle.thrust_max
-    balance = _balanced_thrust(vehicle, able, reserve)
+    held = wrench_of(vehicle, believed.stuck.thrust)
+    # A rotor that is stuck alone may carry more than the weight; the floor leaves the others something to share.
+    carried = maximum(weight - held.thrust, LEAST_CARRIED * weight)
+    balance = _balanced_thrust(vehicle, able, Wrench(carried, -held.torque_B), reserve)
 
     def room(most: Scalar, thrust: Scalar) -> Scalar:
         # A dead rotor bounds nothing.
         return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
 
-    return able.map(room, balance).reduce(minimum) * weight, balance
+    most = held.thrust + able.map(room, balance).reduce(minimum) * carried
+    return most, balance + believed.stuck.thrust
 
 
-def _balanced_thrust(vehicle: Vehicle, able: PerRotor, reserve: Scalar) -> PerRotor:
-    """Thrusts in N with which the believed rotors carry the weight, each living one with its reserve."""
-=======
 def _balanced_thrust(vehicle: Vehicle, able: PerRotor, left: Wrench, reserve: Scalar) -> PerRotor:
     """Thrusts in N with which the rotors that follow give what stuck ones leave, each living one with its reserve."""
->>>>>>> 334168f (Steer a spinning body by all laws, beside a rotor stuck high too; refuse whole numbers beyond 64 bits; let fuzzed kinds take turns)
     weight = vehicle.mass * vehicle.gravity
     # Where nothing lives the sum is 0; the floor keeps the quotient a number.
     most = able.sum() if vehicle.tilt == () else able.dot(effectiveness(vehicle).thrust)
