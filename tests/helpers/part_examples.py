@@ -38,6 +38,8 @@ def _value(kind: Any, metadata: list[Any], folder: Path, rising: Iterator[int]) 
         return _value(inner[0], list(inner[1:]), folder, rising)
     if origin in (typing.Union, types.UnionType):
         return _value(inner[0], metadata, folder, rising)
+    if origin is typing.Literal:
+        return inner[0]
     if origin is tuple:
         count = 1 if inner[-1] is Ellipsis else len(inner)
         return [_value(inner[0], [], folder, rising) for _ in range(count)]

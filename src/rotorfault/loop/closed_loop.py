@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, TypeVar, cast, final
 from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
 from rotorfault.autopilot.response.protocol import ON_FAULT
 from rotorfault.base.one_line import LONGEST, cut
+from rotorfault.loop.fault_line import FaultLine
 from rotorfault.loop.recorded import Recorder
 from rotorfault.loop.scores import Scores, ScoringParameters, unjudged
 from rotorfault.loop.scoring import Scoring
@@ -130,7 +131,8 @@ class ClosedLoop:
         self.autopilot = Autopilot(
             {slot: cast("AnyBlock", part) for slot, part in self.parts.items() if slot.side == "belief"}
         )
-        self.plant = Plant(self[PLANT], self[WIND], self.all(FAULT), substeps, self.maybe(GROUND))
+        self.faults = FaultLine(self.all(FAULT))
+        self.plant = Plant(self[PLANT], self[WIND], self.faults.of_rotors, substeps, self.maybe(GROUND))
         self.sensors = self[SENSORS]
         self._names = tuple(slot.name for slot in truth)
         self._memories = record_type("TruthParts", self._names)
@@ -253,8 +255,10 @@ class ClosedLoop:
         # Read as at the first step, which reads them once more.
         sensed = self._sensed(truth, 0.0, _normals(drive.normals, "sensors"), numbers)
         readings = self.sensors.step(sensors, sensed, numbers.sensors, parameters.period)[1]
+        spoilt = self.faults.first(readings, _of_faults(numbers))
+        readings = self.faults.through(spoilt, readings, 0.0, _of_faults(numbers))[1]
         autopilot = self.autopilot.initial(readings, drive.reference, parameters.belief, numbers, parameters.period)
-        return LoopState(plant, self._kept(held, sensors), autopilot, self.scoring.initial(), 0.0)
+        return LoopState(plant, self._kept(held, sensors, spoilt), autopilot, self.scoring.initial(), 0.0)
 
     def step(self, state: LoopState, drive: Drive, parameters: LoopParameters) -> tuple[LoopState, Record]:
         """One sampling period: the state after it, and the signals at its beginning."""
@@ -284,6 +288,7 @@ class ClosedLoop:
         truth = self.plant.observe(state.plant, held, air, time, plant_numbers)
         sensed = self._sensed(truth, time, _normals(drive.normals, "sensors"), numbers)
         sensors, readings, telemetry["sensors"] = self.sensors.step(state.truth.sensors, sensed, numbers.sensors, dt)
+        spoilt, readings = self.faults.through(_of_faults(state.truth), readings, time, _of_faults(numbers))
         memory, command, report = self.autopilot.step(
             state.autopilot,
             readings,
@@ -297,7 +302,7 @@ class ClosedLoop:
         scores = self.scoring.step(
             state.scores, recorded, parameters.scoring, self.onsets(numbers), state.steps, time, dt
         )
-        after = LoopState(state.plant, self._kept(held, sensors), memory, scores, state.steps + 1.0)
+        after = LoopState(state.plant, self._kept(held, sensors, spoilt), memory, scores, state.steps + 1.0)
         return after, self._compensated(command, truth, parameters.belief), recorded
 
     def _compensated(self, command: Command, truth: Truth, belief: Vehicle) -> Command:
@@ -321,7 +326,7 @@ class ClosedLoop:
 
     def held(self, state: LoopState) -> Held:
         """Memories of wind and faults over the period that begins, after `decide`."""
-        return Held(state.truth.wind, state.truth.fault if self.plant.faults else ())
+        return Held(state.truth.wind, self.faults.rotors(_of_faults(state.truth)))
 
     def _blown(
         self, state: LoopState, drive: Drive, parameters: LoopParameters, telemetry: dict[str, Record]
@@ -334,7 +339,9 @@ class ClosedLoop:
         )
         faults = []
         each = zip(self.plant.faults, before.faults, self._faults(numbers), strict=True)
-        for number, (fault, memory, one) in enumerate(each):
+        for number in range(len(self.all(FAULT))):
+            telemetry[f"fault_{number}"] = Nothing()
+        for number, (fault, memory, one) in zip(self.faults.places, each, strict=True):
             memory, _, telemetry[f"fault_{number}"] = fault.step(memory, TimeInputs(time), one, dt)
             faults.append(memory)
         return Held(wind, tuple(faults)), air
@@ -348,11 +355,11 @@ class ClosedLoop:
         return self.plant.true_loss(plant, held, time - age, self.plant_numbers(parameters))
 
     def onsets(self, numbers: Any) -> tuple[Scalar, ...]:
-        """Time of the first effect of each fault in s."""
+        """Time of the first effect of each fault of a rotor in s."""
         return tuple(fault.onset(one) for fault, one in zip(self.plant.faults, self._faults(numbers), strict=True))
 
     def _faults(self, numbers: Any) -> tuple[Any, ...]:
-        return cast("tuple[Any, ...]", numbers.fault) if self.plant.faults else ()
+        return self.faults.rotors(_of_faults(numbers))
 
     def plant_numbers(self, parameters: LoopParameters) -> PlantParameters:
         """The numbers of the truth's parts, as the plant has them."""
@@ -368,10 +375,15 @@ class ClosedLoop:
         ground = 0.0 if self.plant.ground is None else self.plant.ground.height(numbers.ground)
         return SensorInputs(time, truth.state, truth.specific_force_B, normals, truth.rotor_speed, ground)
 
-    def _kept(self, held: Held, sensors: Any) -> Any:
+    def _kept(self, held: Held, sensors: Any, spoilt: dict[int, Any]) -> Any:
         """Memories of the truth's parts by slot; the body and the ground have none of their own."""
-        own = {"wind": held.wind, "fault": held.faults, "sensors": sensors}
+        own = {"wind": held.wind, "fault": self.faults.all(held.faults, spoilt), "sensors": sensors}
         return self._memories(*(own.get(name, ()) for name in self._names))
+
+
+def _of_faults(records: Any) -> tuple[Any, ...]:
+    """Numbers or memories of all faults; a loop may have none."""
+    return getattr(records, "fault", ())
 
 
 def _normals(normals: Any, slot: str) -> tuple[Scalar, ...]:

@@ -11,6 +11,7 @@ from rotorfault.plant.models import PLANT, BodyModel
 from rotorfault.plant.paper_model import PaperModel
 from rotorfault.plant.plant import Plant, PlantParameters, PlantState, Truth
 from rotorfault.plant.rigid_body import RigidBody
+from rotorfault.plant.sensor_faults import SensorBias, SensorDropout, SensorFault, SensorFreeze
 from rotorfault.plant.sensor_sets import Crazyflie, GpsConsumer, Mocap
 from rotorfault.plant.sensors import SENSORS, Sensors
 from rotorfault.plant.wind import WIND, Air, Wind
@@ -35,6 +36,10 @@ __all__ = [
     "PlantState",
     "RigidBody",
     "RotorFault",
+    "SensorBias",
+    "SensorDropout",
+    "SensorFault",
+    "SensorFreeze",
     "Sensors",
     "Truth",
     "Wind",
