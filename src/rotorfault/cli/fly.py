@@ -40,6 +40,10 @@ def fly(
     repeat: Annotated[
         Path | None, typer.Option(metavar="FLIGHT.nc", help="Fly again what this file holds, instead of a scenario.")
     ] = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(metavar="LOG", help="Fly what this log shows: its path, wind and fault; the page has both."),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Write the flight's page as well: flight.html.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the flight in the terminal while it is flown.")] = False,
     live_speed: Annotated[
@@ -68,6 +72,14 @@ def fly(
                 again = fly_again(repeat, engine, allow_code=allow_code, follow=follow)
             finish(again, folder, figures, view)
         return
+    if like is not None:
+        if any(value is not None for value in (scenario, seed)) or allow_code:
+            raise InputError(
+                "--like makes the scenario of the log; give it without a scenario, --seed or --allow-code"
+            )
+        settings = parse_overrides(assignments or [])
+        _like(like, controller, preset, settings, engine, out, figures, watched)
+        return
     if scenario is None:
         raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
     settings = parse_overrides(assignments or [])
@@ -79,6 +91,33 @@ def fly(
         with watched as follow:
             flight = _flown(checked, engine, follow)
         finish(flight, folder, figures, view)
+
+
+def _like(
+    log: Path,
+    controller: str | None,
+    preset: str | None,
+    settings: dict[str, object],
+    engine: str | None,
+    out: Path | None,
+    figures: bool,
+    watched: AbstractContextManager[Follow | None],
+) -> None:
+    """Fly what a log shows, and write the page of both."""
+    from rotorfault.base.files import made_folder
+    from rotorfault.flight.fly import prepare
+    from rotorfault.logs.flown_again import like, write_both
+
+    with made_folder(out or Path("results") / file_name(f"like-{log.stem}")) as folder:
+        made = like(log, folder, settings)
+        named = {} if preset is None else {"controller.preset": preset}
+        checked = prepare("hover-fault", controller, {**named, **made.settings}, None)
+        say("\n".join([*made.notes, ""]))
+        with watched as follow:
+            flight = _flown(checked, engine, follow)
+        finish(flight, folder, figures)
+        page = write_both(made, flight, folder / "like.html")
+        say(f"the log and the flight side by side: {page}")
 
 
 def _watched(live: bool, speed: float | None) -> AbstractContextManager[Follow | None]:

@@ -26,7 +26,8 @@ def new(
             "--from",
             metavar="FORMAT SOURCE",
             help="Make a vehicle of another program's: px4 FILE.params, ardupilot FILE.param, rotorpy FILE.py:OBJECT "
-            "or MODULE:OBJECT, sdf FILE, urdf FILE. The options below give what it does not say.",
+            "or MODULE:OBJECT, sdf FILE, urdf FILE; or of a flight, log LOG. The "
+            "options below give what it does not say.",
         ),
     ] = None,
     estimate: Annotated[
@@ -105,7 +106,12 @@ def _imported(
     if what != "vehicle":
         raise InputError(f"--from: got a {what}; allowed: rotorfault new vehicle NAME --from FORMAT SOURCE")
     plain = name.removesuffix(".toml")
-    made = imported_vehicle(*source, plain, given, estimate, allow_code)
+    if source[0] == "log":
+        from rotorfault.logs.vehicle_of_log import vehicle_of_log
+
+        made = vehicle_of_log(source[1], plain, given, estimate)
+    else:
+        made = imported_vehicle(*source, plain, given, estimate, allow_code)
     path = catalogue.write_new(what, name, out, force, made.text)
     levels = [rotor.level for rotor in made.rotors]
     say("\n".join([*layout_lines(made.file, [rotor.number for rotor in made.rotors], source[0], levels), ""]))

@@ -68,7 +68,7 @@ def write_diagnosis(found: LogDiagnosis, folder: Path, name: str = "", vehicle: 
     return write_page([shown(found, file=file)], output_folder(folder) / (name or page_name(found)))
 
 
-def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None) -> Shown:
+def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None, begin: float | None = None) -> Shown:
     """A diagnosed log as a flight of the page.
 
     Parameters
@@ -77,8 +77,11 @@ def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None)
     label : str, optional
     file : VehicleFile, optional
         To be drawn.
+    begin : float, optional, s
+        Of the log's clock, that is 0 on the page; else its first record.
     """
-    data = data_of(found, file)
+    zero = found.log.start if begin is None else begin
+    data = data_of(found, file, begin)
     rows = [
         (f"{one.probability:.0%} {one.cause}" + (f", rotor {one.rotor}" if one.rotor else ""), one.evidence)
         for one in found.causes
@@ -89,7 +92,7 @@ def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None)
     rows += [("read", said) for said in found.log.remarks]
     if found.log.damage.reason:
         rows.append(("lost in reading", found.log.damage.reason))
-    return Shown(label or found.verdict, data, rows, facts=_facts(found), happened=_events(found))
+    return Shown(label or found.verdict, data, rows, facts=_facts(found), happened=_events(found, zero))
 
 
 def _facts(found: LogDiagnosis) -> list[Fact]:
@@ -111,23 +114,23 @@ def _facts(found: LogDiagnosis) -> list[Fact]:
     return facts
 
 
-def _events(found: LogDiagnosis) -> list[Event]:
+def _events(found: LogDiagnosis, zero: float) -> list[Event]:
     log, events = found.log, list[Event]()
     for note in log.notes:
         if note.alarm:
-            events.append(Event(note.time - log.start, "switch", f"its own: {note.text}", 0))
+            events.append(Event(note.time - zero, "switch", f"its own: {note.text}", 0))
     first = found.probable
     if first.rotor is not None and first.onset is not None:
         text = f"{rotor_words(log, first.rotor)} begins to lose thrust"
-        events.append(Event(first.onset - log.start, "fault", text, first.rotor))
+        events.append(Event(first.onset - zero, "fault", text, first.rotor))
         if found.alarm is not None:
             text = f"the evidence against rotor {first.rotor} is an alarm"
-            events.append(Event(found.alarm - log.start, "alarm", text, first.rotor))
-    events.append(Event(log.duration, "end", "the log ends"))
+            events.append(Event(found.alarm - zero, "alarm", text, first.rotor))
+    events.append(Event(log.start + log.duration - zero, "end", "the log ends"))
     return sorted(events)
 
 
-def data_of(found: LogDiagnosis, file: VehicleFile | None = None) -> FlightData:
+def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | None = None) -> FlightData:
     """A log and its diagnosis as records at even times.
 
     Parameters
@@ -135,11 +138,16 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None) -> FlightData:
     found : LogDiagnosis
     file : VehicleFile, optional
         Of the vehicle, to be drawn.
+    zero : float, optional, s
+        Of the log's clock, where the records begin; else the first record.
     """
     log = found.log
-    step = max(STEP, log.duration / MOST)
-    time = np.arange(0.0, max(log.duration, step) + 0.5 * step, step)
-    clock = time + log.start
+    whole = zero is None  # beside a flight of ours both are told apart by their numbers
+    zero = log.start if zero is None else zero
+    length = max(log.start + log.duration - zero, STEP)
+    step = max(STEP, length / MOST)
+    time = np.arange(0.0, length + 0.5 * step, step)
+    clock = time + zero
     variables: dict[str, Variable] = {}
     for quantity, (name, unit, dim) in NAMES.items():
         series = log.series.get(quantity)
@@ -171,7 +179,11 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None) -> FlightData:
         "channel": np.array(["roll", "pitch", "yaw", "thrust"]),
     }
     said = {"time": {"units": "s", "long_name": "time since the first record"}}
-    attributes: dict[str, Any] = {"scenario": log.source, "vehicle": "" if file is None else file.name, "logged": 1}
+    attributes: dict[str, Any] = {
+        "scenario": log.source,
+        "vehicle": "" if file is None else file.name,
+        **({"logged": 1} if whole else {}),
+    }
     if file is not None:
         attributes["configuration"] = json.dumps({"vehicle": file.model_dump(mode="json")})
     return FlightData(

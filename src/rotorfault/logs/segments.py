@@ -49,8 +49,10 @@ def flight_spans(log: Log) -> list[tuple[float, float]]:
     up = mean > PULLING * float(np.median(mean[running]))
     if (landed := log.series.get("landed")) is not None:
         up &= landed.at(command.time)[:, 0] < 0.5
-    if (position := log.series.get("position")) is not None and np.ptp(position.values[:, 2]) < LIFTED:
-        return []  # it never leaves the ground
+    if (position := log.series.get("position")) is not None:
+        height = position.values[:, 2]
+        if np.ptp(height) < LIFTED and abs(float(np.median(height))) < 2.0 * LIFTED:
+            return []  # it never leaves the ground
     at = command.time[up]
     if not len(at):
         return []
