@@ -149,7 +149,7 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | 
     time = np.arange(0.0, length + 0.5 * step, step)
     clock = time + zero
     variables: dict[str, Variable] = {}
-    for quantity, (name, unit, dim) in NAMES.items():
+    for quantity, (signal, unit, dim) in NAMES.items():
         series = log.series.get(quantity)
         if series is None:
             continue
@@ -163,7 +163,7 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | 
             variables["attitude"] = Variable(("time", "angle"), np.column_stack([*_columns(euler)]), about)
         dims = ("time", dim) if quantity != "battery" else ("time",)
         about = {"units": unit, "long_name": f"{quantity.replace('_', ' ')} of the log"}
-        variables[name] = Variable(dims, values if len(dims) == 2 else values[:, 0], about)
+        variables[signal] = Variable(dims, values if len(dims) == 2 else values[:, 0], about)
     if (command := log.series.get("command")) is not None:
         about = {"units": "1", "long_name": "share of the greatest thrust that each motor was asked for"}
         variables["diagnosis.command_of_motors"] = Variable(("time", "rotor"), command.at(clock), about)
@@ -179,7 +179,10 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | 
         "channel": np.array(["roll", "pitch", "yaw", "thrust"]),
     }
     said = {"time": {"units": "s", "long_name": "time since the first record"}}
-    attributes: dict[str, Any] = {
+    name = "" if file is None else file.name
+    attributes: dict[str, Any] = {"scenario": log.source, "vehicle": name}
+    if whole:
+        attributes["logged"] = 1
         "scenario": log.source,
         "vehicle": "" if file is None else file.name,
         **({"logged": 1} if whole else {}),
