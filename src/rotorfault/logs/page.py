@@ -183,10 +183,6 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | 
     attributes: dict[str, Any] = {"scenario": log.source, "vehicle": name}
     if whole:
         attributes["logged"] = 1
-        "scenario": log.source,
-        "vehicle": "" if file is None else file.name,
-        **({"logged": 1} if whole else {}),
-    }
     if file is not None:
         attributes["configuration"] = json.dumps({"vehicle": file.model_dump(mode="json")})
     return FlightData(
