@@ -185,7 +185,7 @@ def relaxed_axis(
     given_up = maximum(free, yaw_given_up(vehicle, 2.0 * weight - with_yaw.least))
     most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
     tau = wrench_of(vehicle, balance).torque_B
-    wanted = _wanted_lean(vehicle, tau, omega_B.z, residual_speed) * given_up
+    wanted = lean_in_balance(vehicle, tau, omega_B.z, residual_speed) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
     lean = memory.lean + (wanted - memory.lean) * (dt / (parameters.time + dt))
@@ -295,7 +295,7 @@ def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench) -> Wrench:
     return wrench_of(vehicle, _thrusts_for(vehicle, high, left).map(clip, low, high) + held)
 
 
-def _wanted_lean(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar | Vec3) -> Vec3:
+def lean_in_balance(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar | Vec3) -> Vec3:
     """(n_x, n_y)/n_z of the axis about which a spinning body balances a tilt torque."""
     J, momentum = vehicle.inertia, rotor_momentum(vehicle, residual_speed)
     d = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
