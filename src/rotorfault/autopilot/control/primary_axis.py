@@ -84,7 +84,7 @@ def primary_axis(lean: Vec3, inputs: ControlInputs, parameters: AxisParameters, 
 
 
 def turn_to(axis: Vec3, wanted: Vec3) -> Vec3:
-    """The shortest turn in rad that takes one unit vector to another, as a rotation vector.
+    """The shortest turn in rad that takes one unit vector to another, as a rotation vector; 0 for opposite ones.
 
     Parameters
     ----------
