@@ -247,17 +247,22 @@ class RangeFinder(Simple):
 
 @final
 class Mark(Simple):
-    """The mark that the vehicle takes off from: where it stands and how it is turned, known once, at the start."""
+    """What is known at the start alone: how the vehicle is turned and, on a mark on the floor, where it stands."""
 
     normals = 0
     first_normals = 6
+
+    def __init__(self, settings: Any) -> None:
+        super().__init__(settings)
+        self.placed = "position" in type(settings).model_fields
 
     def off_grid(self, name: str, period: float) -> None:
         """It is read once."""
 
     def parameters(self, context: Context) -> ErrorParameters:
         """Standard deviations."""
-        return ErrorParameters((self.settings.position, self.settings.attitude), (0.0, 0.0), _ONCE)
+        s = self.settings
+        return ErrorParameters((s.position if self.placed else 0.0, s.attitude), (0.0, 0.0), _ONCE)
 
     def truth(self, inputs: SensorInputs, p: ErrorParameters, wander: Any) -> Any:
         """Position and attitude."""
@@ -266,11 +271,13 @@ class Mark(Simple):
         return position, inputs.state.q_WB @ Quat.small(Vec3.of(n[3:6]) * p.std[1])
 
     def given(self, reading: Reading[Any], inputs: SensorInputs, p: ErrorParameters) -> Given:
-        """Both, valid at the first instant alone."""
+        """Valid at the first instant alone."""
         position, attitude = reading.value
-        return {"position": reading._replace(value=position), "attitude": reading._replace(value=attitude)}
+        given: Given = {"attitude": reading._replace(value=attitude)}
+        return given | ({"position": reading._replace(value=position)} if self.placed else {})
 
     def model(self, context: Context) -> Given:
-        """As well as a vehicle can be put down by hand."""
+        """As well as it is known."""
         s = self.settings
-        return {"position": SensorNoise(s.position, _ONCE), "attitude": SensorNoise(s.attitude, _ONCE)}
+        model: Given = {"attitude": SensorNoise(s.attitude, _ONCE)}
+        return model | ({"position": SensorNoise(s.position, _ONCE)} if self.placed else {})

@@ -131,6 +131,15 @@ class GpsSettings(Timed):
     wander_time: float = _number(60.0, "its correlation time [s]", "PX4 SITL, gazebo_gps_plugin.h: 60 s", gt=0.0)
 
 
+class AlignedSettings(Strict):
+    """The attitude that an autopilot has found at rest on the ground, before it took off."""
+
+    attitude: Angle = _number(
+        0.03, "standard deviation about each axis [rad]",
+        "0.02 by 20 mg of the accelerometer's bias, 0.028 by 0.6 uT of a horizontal field of 21.6 uT",
+    )  # fmt: skip
+
+
 class MagnetometerSettings(Timed):
     """A magnetometer, calibrated."""
 
@@ -272,13 +281,15 @@ class GpsConsumer(SensorSet):
     """An inertial unit, a satellite receiver, a magnetometer and a barometer of a consumer autopilot."""
 
     devices: ClassVar[dict[str, type[Device[Any, Any]]]] = {
-        "imu": Imu, "gps": Fix, "magnetometer": Magnetometer, "barometer": Barometer, "rotor_speeds": Tachometer,
+        "imu": Imu, "aligned": Mark, "gps": Fix, "magnetometer": Magnetometer, "barometer": Barometer,
+        "rotor_speeds": Tachometer,
     }  # fmt: skip
 
     class Settings(Strict):
         """Each device by itself."""
 
         imu: ImuSettings = _group(ImuSettings)
+        aligned: AlignedSettings = _group(AlignedSettings)
         gps: GpsSettings = _group(GpsSettings)
         magnetometer: MagnetometerSettings = _group(MagnetometerSettings)
         barometer: BarometerSettings = _group(BarometerSettings)

@@ -3,8 +3,9 @@
 Importing the package registers every estimator, so that the registry is complete.
 """
 
+from rotorfault.autopilot.estimation.complementary import Complementary
 from rotorfault.autopilot.estimation.direct import Direct
 from rotorfault.autopilot.estimation.eskf import Eskf
 from rotorfault.autopilot.estimation.protocol import ESTIMATOR, Estimator, EstimatorInputs
 
-__all__ = ["ESTIMATOR", "Direct", "Eskf", "Estimator", "EstimatorInputs"]
+__all__ = ["ESTIMATOR", "Complementary", "Direct", "Eskf", "Estimator", "EstimatorInputs"]

@@ -85,7 +85,7 @@ class EskfMemory(NamedTuple):
     rates: Vec3  # rad/s: unbiased, of the last instant
     force_W: Vec3  # m/s^2: unbiased, of the last instant
     behind: tuple[Moved, ...]
-    floor: Scalar  # m: height of the ground, as first seen
+    floor: Scalar  # m: height of the ground, as first seen and corrected since
     count: Scalar  # sampling instants so far
 
 
@@ -196,7 +196,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             rates,
             force_W,
             corrected(behind, speed, timing, memory.count, dt),
-            memory.floor,
+            memory.floor if states.floor is None else memory.floor + error[states.floor],
             memory.count + 1.0,
         )
         deviations = self._deviations(filter_, sensors)

@@ -6,7 +6,8 @@ With :math:`\tau` the age of a late measurement, its error is that of the state 
 - *Attitude*: the rotation from the predicted to the measured one, in the axes of the world, is :math:`\theta` itself.
 - *Magnetic field* :math:`m`: of :math:`R\,m_B - m = m \times \theta` only the component across the field in the
   horizontal plane is used, which tells the heading; the others would tell the tilt, which is known better.
-- *Range* :math:`d` along -z of the body: :math:`d\,R_{zz}` is the height above the floor as first seen.
+- *Range* :math:`d` along -z of the body: :math:`d\,R_{zz}` is the height above the floor, whose own height is a
+  state, for it was found from the first height and is wrong by as much.
 - *Flow*: :math:`(u + \omega_y)\,d` is the velocity along body x, and :math:`(w - \omega_x)\,d` along body y.
 """
 
@@ -24,6 +25,7 @@ from rotorfault.maths.scalar import Scalar, greater, less, maximum, select
 from rotorfault.model.sensor_model import SensorModel, SensorNoise
 from rotorfault.model.signals import Reading, Readings
 
+LEAST_UPRIGHT = 0.3  # cosine of the tilt beyond which the ground is not looked at
 LEAST_HEIGHT = 0.02  # m: a flow is not scaled by less
 
 
@@ -71,7 +73,7 @@ def take_in(
     _attitude(filter_, readings, sensors, belief, then, running)
     _field(filter_, readings, sensors, belief, running)
     _height(filter_, readings, sensors, states, belief, running)
-    _ground(filter_, readings, sensors, belief, running)
+    _ground(filter_, readings, sensors, states, belief, running)
     return innovation
 
 
@@ -170,28 +172,34 @@ def _height(
     filter_.correct(row, value, squared(sensor.std), reading.valid * running)
 
 
-def _ground(filter_: Filter, readings: Readings, sensors: SensorModel, belief: Belief, running: Scalar) -> None:
+def _ground(
+    filter_: Filter, readings: Readings, sensors: SensorModel, states: States, belief: Belief, running: Scalar
+) -> None:
+    distance, sensor, floor = readings.range, sensors.range, states.floor
+    if floor is None:
+        return
     upright, height = belief.R.zz, belief.p_W.z - belief.floor
-    distance, sensor = readings.range, sensors.range
+    sees = greater(upright, LEAST_UPRIGHT)
+    # By how much the cosine of the tilt is wrong, for small errors of the attitude.
+    lean = {ERROR: belief.R.yz, ERROR + 1: -belief.R.xz}
     if _comes_again(distance, sensor):
         assert isinstance(distance, Reading)
         assert isinstance(sensor, SensorNoise)
-        valid = distance.valid * running * greater(upright, 0.3)
-        filter_.correct({P + 2: 1.0}, distance.value * upright - height, squared(sensor.std * upright), valid)
-    flow, sensor = readings.flow, sensors.flow
+        row: dict[int, Scalar] = {P + 2: 1.0, floor: -1.0} | {k: -distance.value * c for k, c in lean.items()}
+        value, variance = distance.value * upright - height, squared(sensor.std * upright)
+        filter_.correct(row, value, variance, distance.valid * running * sees)
+    flow, sensor, gyro = readings.flow, sensors.flow, sensors.rates
     if not _comes_again(flow, sensor):
         return
     assert isinstance(flow, Reading)
     assert isinstance(sensor, SensorNoise)
-    gyro = sensors.rates
     assert isinstance(gyro, SensorNoise)
-    over = 1.0 / maximum(upright, 0.3)
+    over = 1.0 / maximum(upright, LEAST_UPRIGHT)
     d = maximum(height, LEAST_HEIGHT) * over
-    valid = flow.valid * running * greater(upright, 0.3)
     variance = squared(sensor.std * d) + squared(gyro.std * d)
     forward, left, _ = belief.R.T.rows
     for axis, turned in ((forward, flow.value.x + belief.rates.y), (left, flow.value.y - belief.rates.x)):
-        row: dict[int, Scalar] = {V + j: c for j, c in enumerate(axis)}
-        row |= {ERROR + j: c for j, c in enumerate(axis.cross(belief.v_W))}
-        row[P + 2] = -turned * over
-        filter_.correct(row, turned * d - axis.dot(belief.v_W), variance, valid)
+        far = turned * over
+        row = {V + j: c for j, c in enumerate(axis)} | {P + 2: -far, floor: far}
+        row |= {ERROR + j: c + far * d * lean.get(ERROR + j, 0.0) for j, c in enumerate(axis.cross(belief.v_W))}
+        filter_.correct(row, turned * d - axis.dot(belief.v_W), variance, flow.valid * running * sees)

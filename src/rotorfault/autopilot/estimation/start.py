@@ -82,8 +82,11 @@ def first_filter(
             variances[ERROR + i] = squared(sensors.attitude.std)
     for i in range(BASIC, states.number):
         variances[i] = LEAST * LEAST
+    distance = sensors.range
+    if states.floor is not None and isinstance(distance, SensorNoise):
+        variances[states.floor] = squared(distance.std)
     if isinstance(readings.attitude, Reading):
-        return Filter.independent(variances)
+        return _on_floor(Filter.independent(variances), states)
     field, noise = sensors.field_W, sensors.magnetic_field
     assert isinstance(noise, SensorNoise)
     variances[ERROR] = variances[ERROR + 1] = squared(tilt) + squared(force.std / gravity)
@@ -98,6 +101,13 @@ def first_filter(
         }
     )
     filter_.move({ERROR + 2: {ERROR: -h.x / h.z, ERROR + 1: -h.y / h.z}})
+    return _on_floor(filter_, states)
+
+
+def _on_floor(filter_: Filter, states: States) -> Filter:
+    """The floor was found from the first height, and is wrong by as much."""
+    if states.floor is not None:
+        filter_.move({states.floor: {P + 2: 1.0}})
     return filter_
 
 

@@ -25,6 +25,7 @@ class States(NamedTuple):
 
     number: int
     slow: tuple[SlowError, ...]
+    floor: int | None = None  # height of the ground, where the distance to it is measured
 
     @classmethod
     def of(cls, sensors: SensorModel) -> States:
@@ -35,6 +36,8 @@ class States(NamedTuple):
             if isinstance(noise, SensorNoise) and not isinstance(noise.wander, tuple):
                 slow.append(SlowError(name, tuple(range(used, used + width)), noise))
                 used += width
+        if isinstance(sensors.range, SensorNoise):
+            return cls(used + 1, tuple(slow), used)
         return cls(used, tuple(slow))
 
     def no_slow_errors(self) -> tuple[Any, ...]:
