@@ -25,9 +25,10 @@ standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` p
 to the other, b away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque.
 What is built walks over its whole spread in an hour, and the mass, for the battery, in ten minutes.
 
-What first-order terms leave out enters as noise: squares of the shares (:math:`e_J^2\dot\omega`,
-:math:`\tfrac12e_w^2 s`), and the products of the rates, which a wrong inertia turns into torque; each lasts about as
-long as a rotor's lag, so its variance times twice that time is the density.
+The filter is linearised where its estimate is (:math:`1/(1 + e_J)`, `rotorfault.autopilot.diagnosis.learned_lag`).
+What that leaves out enters as noise: the square of the lag's share, :math:`P_{ww} s` of a size, and the products of
+the rates, which a wrong inertia turns into torque; each lasts about as long as a rotor's lag, so its variance times
+twice that time is the density.
 
 The noise of the gyroscope is its own, and what vibrates: the variance of the measurement follows the innovations,
 
@@ -44,6 +45,7 @@ from typing import NamedTuple
 
 from pydantic import Field
 
+from rotorfault.autopilot.diagnosis import learned_lag
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -59,7 +61,7 @@ from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, clip, less, maximum, minimum, select
+from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, minimum, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
@@ -74,6 +76,7 @@ RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10,
 NOISE_MEMORY = 0.5  # s: time constant of the measured noise; many periods, and few of a flight
 OUTLIER = 9.0  # expected squares that one innovation may count for: three standard deviations
 ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
+LEAST_INERTIA = 0.5  # share by which an inertia may seem to be wrong: more is no wrong model
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
 SLOW = 3600.0  # s: in which what is built changes by as much as it is uncertain: some flights
@@ -108,8 +111,6 @@ class ModelParameters(NamedTuple):
     gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
     drag: Scalar  # 1/s: drag over airspeed and mass
     inertia: Scalar  # share
-    bandwidth: Scalar  # share
-    lag_decay: Scalar  # what remains of a rotor's lag over one period
     lag: Scalar  # s: of the rotors
     gyroscope: Scalar  # rad^2/s^2: least variance
     accelerometer: Scalar  # m^2/s^4: least variance
@@ -119,7 +120,9 @@ class ModelMemory(NamedTuple):
     """The state and what goes with it."""
 
     belief: Belief
-    lag: PerRotor  # N: sensitivity of the thrusts to the logarithm of the bandwidth
+    lagged: PerRotor  # N: lag outputs of sound rotors, with the learned bandwidth
+    speed: PerRotor  # rad/s: of sound rotors
+    lag: PerRotor  # N: sensitivity of the lag outputs to the logarithm of the bandwidth
     reaction: Scalar  # rad/s: of the yaw rate, by the rotors' reaction
     noise: Vec3  # rad^2/s^2: variance of the measured rates
     force_noise: Vec3  # m^2/s^4: variance of the measured specific force
@@ -169,8 +172,6 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         gradient=Vec3(*(_gradient(s, drag, arms) / (j * j) for j in J)),
         drag=over,
         inertia=s.inertia,
-        bandwidth=s.bandwidth,
-        lag_decay=math.exp(-w * context.period),
         lag=1.0 / w,
         gyroscope=_variance(context, "rates", s.gyroscope),
         accelerometer=_variance(context, "specific_force", s.accelerometer),
@@ -218,7 +219,8 @@ def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemor
         (*inputs.estimate.omega_B, *(0.0,) * len(p.start), *known),
         (*(p.gyroscope,) * 3, *p.start, *known),
     )
-    return ModelMemory(belief, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
+    hover, speed = inputs.expectation.thrust / inputs.vehicle.rotor_gain, inputs.expectation.speed
+    return ModelMemory(belief, hover, speed, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
 
 
 def advance(
@@ -227,6 +229,7 @@ def advance(
     parameters: ModelParameters,
     drift: PerRotor,
     stuck: PerRotor,
+    period: Scalar,
 ) -> tuple[ModelMemory, Step]:
     """One sampling instant.
 
@@ -239,9 +242,13 @@ def advance(
         Variance by which each loss grows per second; 0 where it is known to be 0.
     stuck : PerRotor
         1 where a rotor is believed not to follow, nor to change its speed.
+    period : scalar, s
+        Sampling period; before the first instant none has passed.
     """
-    p, e, vehicle = parameters, inputs.expectation, inputs.vehicle
-    dt, belief, mean = e.elapsed, memory.belief, memory.belief.mean
+    p, belief, mean = parameters, memory.belief, memory.belief.mean
+    vehicle = learned_lag.with_lag(inputs.vehicle, mean[BANDWIDTH])
+    e, lagged = learned_lag.held(memory.lagged, memory.speed, inputs.expectation, inputs.command, vehicle, period)
+    dt = e.elapsed
     thrust = e.mean_thrust
     wrench = wrench_of(vehicle, thrust)
     omega_B = (e.previous.omega_B + e.now.omega_B) * 0.5
@@ -250,7 +257,7 @@ def advance(
         turning = turning + torque_of_turning(vehicle, omega_B, e.speed)
     turn = over_inertia(vehicle, wrench.torque_B + turning)
 
-    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, p.lag_decay)
+    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, exp(-mean_bandwidth(vehicle) * period))
     left = 1.0 - believed_losses(belief, vehicle.rotors)
     lagging = over_inertia(vehicle, wrench_of(vehicle, (memory.lag + lag) * 0.5 * left).torque_B)
     reacting = reaction_sensitivity(lag, e, vehicle)
@@ -264,7 +271,9 @@ def advance(
 
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
-    wrong = _second_order(vehicle, omega_B, lagging, turn, p)
+    wrong = _second_order(vehicle, omega_B, lagging, belief, p)
+    change = turn * dt + reaction(e, vehicle, stuck)
+    known: dict[int, Scalar] = {}
     for axis, name in enumerate("xyz"):
         row = {
             OFFSETS + axis: weigh * dt,
@@ -272,14 +281,17 @@ def advance(
             **({LEVERS + axis: lever[axis] * dt} if axis < 2 else {}),
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
-        # Of what turns the body in all, a wrong inertia is wrong by a share.
-        row[INERTIA + axis] = -(getattr(turn, name) * dt + dot(row, mean))
+        # Of what turns the body in all, a wrong inertia is wrong by a share; the learned lag is in the model already.
+        learned, moved = row[BANDWIDTH] * mean[BANDWIDTH], getattr(change, name)
+        whole = moved + dot(row, mean) - learned
+        share = 1.0 / (1.0 + clip(mean[INERTIA + axis], -LEAST_INERTIA, LEAST_INERTIA))
+        row[INERTIA + axis] = -whole * share * share
+        known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
         rows[RATES + axis] = row
         noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
     noise |= {LOSSES + i: drifts * dt for i, drifts in enumerate(drift)}
-    change = turn * dt + reaction(e, vehicle, stuck)
-    belief = predict(belief, rows, {RATES + axis: value for axis, value in enumerate(change)}, noise)
+    belief = predict(belief, rows, known, noise)
 
     seen: list[tuple[Sparse, Innovation]] = []
     variances: list[Scalar] = []
@@ -305,7 +317,9 @@ def advance(
         seen.append((row, one))
         variances_of_force.append(_noise_after(variance, one, p.accelerometer, dt))
 
-    after = ModelMemory(belief, lag, reacting, Vec3.of(variances), Vec3.of(variances_of_force))
+    lagged = lagged + lag * (belief.mean[BANDWIDTH] - mean[BANDWIDTH])
+    speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
+    after = ModelMemory(belief, lagged, speed, lag, reacting, Vec3.of(variances), Vec3.of(variances_of_force))
     return after, Step(rows, torque, force, tuple(seen))
 
 
@@ -332,15 +346,14 @@ def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar
     return -left * (m / J.x), forward * (m / J.y)
 
 
-def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, turn: Vec3, p: ModelParameters) -> Vec3:
-    """Density in rad^2/s^3 of what the first order leaves out."""
+def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, belief: Belief, p: ModelParameters) -> Vec3:
+    """Density in rad^2/s^3 of what the first order leaves out: less of it, the better the parameters are known."""
     J = vehicle.inertia
     others = Vec3(J.y + J.z, J.z + J.x, J.x + J.y)
     products = Vec3(omega_B.y * omega_B.z, omega_B.z * omega_B.x, omega_B.x * omega_B.y)
     spun = products.times(others).over(J) * p.inertia
-    lagged = lagging * (0.5 * p.bandwidth * p.bandwidth)
-    turned = turn * (p.inertia * p.inertia)
-    squares = (a * a + b * b + c * c for a, b, c in zip(spun, lagged, turned, strict=True))
+    lagged = lagging * belief.of(BANDWIDTH, BANDWIDTH)
+    squares = (a * a + b * b for a, b in zip(spun, lagged, strict=True))
     return Vec3(*(2.0 * p.lag * square for square in squares))
 
 

@@ -103,7 +103,7 @@ class Glr(Diagnoser[GlrMemory, GlrParameters]):
         """One sampling instant."""
         p, rotors, flagged = parameters, inputs.vehicle.rotors, memory.verdict.flagged
         none = PerRotor.all(0.0, rotors)
-        model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none)
+        model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none, dt)
         windows = jumps.watch(memory.windows, p.length, step, dt)
         found = jumps.best(windows, p.least)
         evidence = found.excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
