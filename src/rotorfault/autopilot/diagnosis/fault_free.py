@@ -77,6 +77,7 @@ NOISE_MEMORY = 0.5  # s: time constant of the measured noise; many periods, and 
 OUTLIER = 9.0  # expected squares that one innovation may count for: three standard deviations
 ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
 LEAST_INERTIA = 0.5  # share by which an inertia may seem to be wrong: more is no wrong model
+TINY = 1e-12  # variance of a loss below which it is known
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
 SLOW = 3600.0  # s: in which what is built changes by as much as it is uncertain: some flights
@@ -230,6 +231,7 @@ def advance(
     drift: PerRotor,
     stuck: PerRotor,
     period: Scalar,
+    pull: Scalar = 0.0,
 ) -> tuple[ModelMemory, Step]:
     """One sampling instant.
 
@@ -244,6 +246,8 @@ def advance(
         1 where a rotor is believed not to follow, nor to change its speed.
     period : scalar, s
         Sampling period; before the first instant none has passed.
+    pull : scalar, 1/s
+        Rate with which losses return to 0 that the motion does not show.
     """
     p, belief, mean = parameters, memory.belief, memory.belief.mean
     vehicle = learned_lag.with_lag(inputs.vehicle, mean[BANDWIDTH])
@@ -289,6 +293,8 @@ def advance(
         known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
         rows[RATES + axis] = row
         noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt
+    if type(pull) is not float or pull != 0.0:  # a number of a batch, or one that is there
+        rows |= {LOSSES + i: {LOSSES + i: -pull * dt} for i in range(vehicle.rotors)}
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
     noise |= {LOSSES + i: drifts * dt for i, drifts in enumerate(drift)}
     belief = predict(belief, rows, known, noise)

@@ -12,6 +12,7 @@ A loss that is found becomes a state of the filter, which goes on to follow it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
@@ -52,7 +53,7 @@ class GlrParameters(NamedTuple):
 
     model: ModelParameters
     length: tuple[Scalar, ...]  # s: of the windows
-    threshold: Scalar  # standard deviations
+    threshold: Scalar  # at which a rotor alone is flagged
     least: Scalar
     drift: Scalar  # 1/s
     persistence: Scalar  # s
@@ -88,8 +89,7 @@ class Glr(Diagnoser[GlrMemory, GlrParameters]):
         s = self.settings
         length = jumps.lengths(context.period)
         threshold = windows_threshold(s.false_alarms, context.vehicle.rotors, length, context.period)
-        model = fault_free.model_parameters(s.model, context)
-        return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence)
+        return start(s, context, length, threshold)
 
     def initial(self, inputs: DiagnosisInputs, parameters: GlrParameters) -> GlrMemory:
         """Nothing is known yet."""
@@ -101,20 +101,64 @@ class Glr(Diagnoser[GlrMemory, GlrParameters]):
         self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: GlrParameters, dt: Scalar
     ) -> tuple[GlrMemory, Diagnosis, Record]:
         """One sampling instant."""
-        p, rotors, flagged = parameters, inputs.vehicle.rotors, memory.verdict.flagged
-        none = PerRotor.all(0.0, rotors)
-        model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none, dt)
-        windows = jumps.watch(memory.windows, p.length, step, dt)
-        found = jumps.best(windows, p.least)
-        evidence = found.excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
-        fresh = verdict.probabilities(evidence, 0.5 * p.threshold * p.threshold, flagged)
-        flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
-        belief = jumps.believe(model.belief, windows, found, new)
-        windows = jumps.begun_anew(windows, 1.0 - new.sum())
 
-        flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
-        after = GlrMemory(model._replace(belief=belief), windows, flags)
-        return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, p.threshold)
+        def evidence(windows: jumps.Windows, found: jumps.Best) -> PerRotor:
+            return found.excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
+
+        level = parameters._replace(threshold=0.5 * parameters.threshold * parameters.threshold)
+        after, diagnosis, signals = found_and_followed(memory, inputs, level, evidence, dt)
+        return after, diagnosis, signals._replace(level=parameters.threshold)
+
+
+def start(settings: GlrSettings, context: Context, length: tuple[float, ...], threshold: float) -> GlrParameters:
+    """Numbers of the settings.
+
+    Parameters
+    ----------
+    settings : GlrSettings
+    context : Context
+        With the believed vehicle and sensors.
+    length : tuple of float, s
+        Of the windows.
+    threshold : float
+        At which a rotor alone is flagged.
+    """
+    s, model = settings, fault_free.model_parameters(settings.model, context)
+    return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence)
+
+
+def found_and_followed(
+    memory: GlrMemory,
+    inputs: DiagnosisInputs,
+    parameters: GlrParameters,
+    evidence: Callable[[jumps.Windows, jumps.Best], PerRotor],
+    dt: Scalar,
+) -> tuple[GlrMemory, Diagnosis, GlrSignals]:
+    """One sampling instant of a detector that watches windows.
+
+    Parameters
+    ----------
+    memory : GlrMemory
+    inputs : DiagnosisInputs
+    parameters : GlrParameters
+        With the evidence at which a rotor alone is flagged as the threshold.
+    evidence : callable
+        Logarithm of the likelihood ratio of a fault of each rotor, from what windows say.
+    dt : scalar, s
+        Sampling period.
+    """
+    p, rotors, flagged = parameters, inputs.vehicle.rotors, memory.verdict.flagged
+    none = PerRotor.all(0.0, rotors)
+    model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none, dt)
+    windows = jumps.watch(memory.windows, p.length, step, dt)
+    found = jumps.best(windows, p.least)
+    fresh = verdict.probabilities(evidence(windows, found), p.threshold, flagged)
+    flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
+    belief = jumps.believe(model.belief, windows, found, new)
+    windows = jumps.begun_anew(windows, 1.0 - new.sum())
+    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
+    after = GlrMemory(model._replace(belief=belief), windows, flags)
+    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, p.threshold)
 
 
 def conclude(
