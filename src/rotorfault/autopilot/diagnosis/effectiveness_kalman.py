@@ -35,6 +35,7 @@ RESPONSE = 0.01  # s: in which the filter follows a jump at the soonest: some in
 class EffectivenessSettings(GlrSettings):
     """As of `glr`, and how far losses spread that nothing is known of."""
 
+    drift: float = Field(default=0.05, gt=0.0, description="by which a loss may change, in a second [1/s^0.5]")
     spread: float = Field(
         default=0.3, gt=0.0, description="standard deviation of losses that the motion does not show"
     )

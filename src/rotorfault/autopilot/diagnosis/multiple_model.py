@@ -1,7 +1,8 @@
 r"""Multiple models: how probable the loss of each rotor is, whatever its size and its onset.
 
 As `rotorfault.autopilot.diagnosis.glr`, with the same filter and the same onsets; but in place of the loss that
-explains most, all losses count, by a normal distribution of the spread s about ``least``, and all onsets. With the score
+explains most, all losses count, by a normal distribution of the spread s about ``least``, and all onsets. With the
+score
 :math:`d' = d - least\,C` of an onset its likelihood ratio against a sound vehicle is
 
 .. math:: \Lambda = \frac{1}{\sqrt{1 + s^2C}}\exp\frac{d'^2}{2(C + 1/s^2)} \quad\text{where } d' > 0, \text{ else }
