@@ -130,13 +130,13 @@ def _as_written(path: Path) -> FlightData | None:
 
 def _dataset(path: Path) -> xr.Dataset:
     """All of it, in memory."""
-    with xr.open_dataset(path, engine="h5netcdf") as opened:
+    with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as opened:
         return opened.load()
 
 
 def _attributes(path: Path) -> dict[str, Any]:
     """What is said of the whole flight. The signals take twenty times as long to read."""
-    with h5netcdf.File(path, "r") as opened:
+    with h5netcdf.File(path, "r", phony_dims="access") as opened:
         return dict(opened.attrs)
 
 
