@@ -88,3 +88,14 @@ def test_no_rotor_that_is_stuck_costs_the_flight(law: str, share: float) -> None
     }
     found = rf.fly_many("hover-fault", {"seed": list(range(8))}, settings=stuck).table.to_pandas()
     assert found["survived"].all(), found["outcome"].tolist()
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("vehicle", ["mueller-2014", "hummingbird"])
+def test_the_little_that_is_believed_to_be_left_of_a_dead_rotor_bounds_nothing(vehicle: str) -> None:
+    """A law without an integral sank to the ground for it: it was never asked for the thrust that there is."""
+    settings = lose(vehicle, (1,), controller={"kind": "smc", "preset": "hummingbird"}, duration=12.0)
+    found = rf.fly_many("hover-fault", {"seed": list(range(8))}, settings=settings).table.to_pandas()
+    assert found["survived"].all()
+    assert found["position_error_end.z"].abs().max() < 2.0

@@ -52,6 +52,9 @@ from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.vehicle import Vehicle, body_momentum, over_inertia, rotor_momentum, wrench_of
 
 YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that holds yaw loses a metre in two seconds
+# Of the weight: a rotor that can give less bounds nothing. Diagnosis says of a dead one that a few percent are left,
+# and its share of a balance would be the most that there is. Our choice: a fifth or less of what a sound one gives.
+LEAST_LIVING = 0.1
 LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 RIDGE = 1e-6  # relative
 MOST = 10.0  # of the weight: more thrust than is ever asked for
@@ -238,8 +241,7 @@ def spinning_thrust(vehicle: Vehicle, believed: Diagnosis, reserve: Scalar) -> t
     balance = _balanced_thrust(vehicle, able, Wrench(carried, -held.torque_B), reserve)
 
     def room(most: Scalar, thrust: Scalar) -> Scalar:
-        # A dead rotor bounds nothing.
-        return select(greater(most, 1e-3 * weight), most / maximum(thrust, 1e-3 * weight), MOST)
+        return select(greater(most, LEAST_LIVING * weight), most / maximum(thrust, 1e-3 * weight), MOST)
 
     most = held.thrust + able.map(room, balance).reduce(minimum) * carried
     return most, balance + believed.stuck.thrust

@@ -26,14 +26,11 @@ from rotorfault.autopilot.instant import Decision
 from rotorfault.autopilot.response.land import Land, LandMemory, LandParameters
 from rotorfault.autopilot.response.protocol import Response, ResponseInputs
 from rotorfault.base.config import Strict
-from rotorfault.maths.scalar import Scalar, any_of, both, greater, less, maximum, select
+from rotorfault.maths.scalar import Scalar, any_of, both, less, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.telemetry import NO_FRAME, Q
 
 RESERVE = 0.3  # of equal thrusts: that of `cascade.relaxed_reserve`
-# Believed loss from which a rotor counts as lost for the spin: the little that is left would bound the thrust of a
-# balance that asks all living rotors for a share. Our choice: the diagnosis seldom says more than 0.98 of a lost one.
-NEARLY = 0.9
 
 
 class AutoParameters(NamedTuple):
@@ -92,8 +89,7 @@ class Auto(Response[LandMemory, AutoParameters]):
         vehicle, believed = inputs.vehicle, inputs.diagnosis
         over = 1.0 / (vehicle.mass * vehicle.gravity)
         with_yaw, without = (thrust * over for thrust in thrusts_in_balance(vehicle, believed.loss, believed.stuck))
-        loss = believed.loss.map(lambda lost: select(greater(lost, NEARLY), 1.0, lost))
-        spun = maximum(spinning_thrust(vehicle, believed._replace(loss=loss), RESERVE)[0] * over, without)
+        spun = maximum(spinning_thrust(vehicle, believed, RESERVE)[0] * over, without)
         short = less(with_yaw, parameters.yaw_margin)
         faulty = any_of(believed.flagged)
         may = both(short, less(spun, parameters.spin_margin))
