@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 import rotorfault
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.api import ReplayWarning
-from rotorfault.campaigns.study import load_study, study_from
+from rotorfault.campaigns.load import load_study
+from rotorfault.campaigns.study import study_from
 from rotorfault.cli.main import app
 
 STUDY: dict[str, Any] = {

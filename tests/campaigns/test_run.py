@@ -23,11 +23,12 @@ from rotorfault.campaigns import run
 from rotorfault.campaigns.block import fly_block
 from rotorfault.campaigns.changes import changed
 from rotorfault.campaigns.flight_set import FlightSet, draws, flight_of, identifiers, seeds
+from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.replay import differences, identifier_of
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.store import parquet
 from rotorfault.campaigns.studies import study_names
-from rotorfault.campaigns.study import Study, load_study, study_from
+from rotorfault.campaigns.study import Study, study_from
 from rotorfault.scenario.library import load_scenario
 
 pytestmark = needs_simd

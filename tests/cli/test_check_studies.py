@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from command_line import assert_refused, run
 
+from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.studies import new_study
-from rotorfault.campaigns.study import load_study
 from rotorfault.cli.kinds_of_file import kind_of
 
 

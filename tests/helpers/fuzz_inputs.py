@@ -20,8 +20,8 @@ from fuzz_values import Draw, changed, changed_bytes, edges, hostile, inline, pl
 from hypothesis import reject
 from hypothesis import strategies as st
 
+from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.studies import FOLDER, study_names
-from rotorfault.campaigns.study import load_study
 from rotorfault.flight.fly import fly
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle, vehicle_names

@@ -34,10 +34,11 @@ from made_up_logs import flown as flown_log
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.flight_set import FlightSet
+from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.replay import settings_of
 from rotorfault.campaigns.run import check as check_study
 from rotorfault.campaigns.sampling.refine import intervals, looks
-from rotorfault.campaigns.study import load_study, study_from
+from rotorfault.campaigns.study import study_from
 from rotorfault.flight.flight import Flight, load
 from rotorfault.flight.fly import fly, prepare
 from rotorfault.flight.many import fly_many

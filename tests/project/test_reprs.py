@@ -15,7 +15,7 @@ from places import EXAMPLES
 
 import rotorfault as rf
 from rotorfault.base.one_line import LONGEST
-from rotorfault.campaigns.study import load_study
+from rotorfault.campaigns.load import load_study
 from rotorfault.engine import load_engine
 from rotorfault.flight.assembly import assemble
 from rotorfault.reference import REFERENCE

@@ -9,7 +9,8 @@ import pytest
 import rotorfault as rf
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.campaigns.changes import changed
-from rotorfault.campaigns.study import load_study, study_from
+from rotorfault.campaigns.load import load_study
+from rotorfault.campaigns.study import study_from
 from rotorfault.scenario.library import load_scenario
 
 PRESET = """

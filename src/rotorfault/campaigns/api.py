@@ -18,13 +18,14 @@ from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
 from rotorfault.campaigns.changes import KIND, changed, with_files
 from rotorfault.campaigns.flight_table import FlightTable
+from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.replay import differences, is_changed, replay
 from rotorfault.campaigns.report.answer import Answer, answer
 from rotorfault.campaigns.report.maps import Maps, maps
 from rotorfault.campaigns.store.folder import FLIGHTS, PAGE, STUDY
 from rotorfault.campaigns.store.identity import read_identity
 from rotorfault.campaigns.store.store import Store
-from rotorfault.campaigns.study import Study, load_study, sources_of, study_from
+from rotorfault.campaigns.study import Study, sources_of, study_from
 from rotorfault.flight import doubts
 from rotorfault.flight.flight import Flight
 from rotorfault.scenario.library import with_whole_paths
@@ -233,6 +234,7 @@ def campaign(
     preset: str | Sequence[str] | None = None,
     seed: int | None = None,
     budget: int | None = None,
+    quick: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     allow_code: bool = False,
@@ -255,7 +257,7 @@ def campaign(
         Names or places in code (``FILE.py:NAME``), compared in place of the study's controllers: each is a variant.
     settings : mapping, optional
         Dotted keys and values for all flights, over all that the study says.
-    vehicle, preset, seed, budget : optional
+    vehicle, preset, seed, budget, quick : optional
         In place of the study's; see `rotorfault.campaigns.changes.changed`.
     workers : int, optional
         Threads; one per core if not given. Nothing in the table depends on it.
@@ -288,7 +290,14 @@ def campaign(
         raise InputError(f"study: got {short(study)}; allowed: a name, a path, tables or a Study")
     require("" if vehicle is None else vehicle, str, "vehicle", "a name, or a path that ends in .toml")
     checked = changed(
-        checked, controllers=controllers, settings=settings, vehicle=vehicle, preset=preset, seed=seed, budget=budget
+        checked,
+        controllers=controllers,
+        settings=settings,
+        vehicle=vehicle,
+        preset=preset,
+        seed=seed,
+        budget=budget,
+        quick=quick,
     ).resolved()
     require("" if out is None else out, (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)

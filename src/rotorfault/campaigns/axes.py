@@ -45,8 +45,45 @@ def _wind(values: Mapping[str, NDArray[Any]]) -> Columns:
     }
 
 
+LOWEST_GUSTS = 3.048  # m: Dryden's spectrum is not said for less
+BEYOND = 1e6  # s: onset of a fault that never comes
+STRUCK = {4: "rotor_of_four", 6: "rotor_of_six", 8: "rotor_of_eight"}
+"""Quantities that say which rotor of a vehicle is struck, by its number of rotors."""
+
+
+def struck_of(values: Mapping[str, Any]) -> int:
+    """Of how many rotors one is struck by the faults of the timeline, one for each rotor; 0 if not said."""
+    return next((count for count, name in STRUCK.items() if name in values), 0)
+
+
+def _times(values: Mapping[str, NDArray[Any]], column: Any, *keys: str) -> Columns:
+    """Times of the first fault; or of one for each rotor, which never comes where nothing is lost."""
+    count = struck_of(values)
+    if count:
+        column = np.where(np.asarray(values.get("loss", 1.0), dtype=float) > 0.0, column, BEYOND)
+    return {f"fault.{number}.{key}": column for number in range(count or 1) for key in keys}
+
+
 def _onset(values: Mapping[str, NDArray[Any]]) -> Columns:
-    return {} if "ramp" in values else {"fault.0.time": values["onset"]}
+    return {} if "ramp" in values else _times(values, values["onset"], "time")
+
+
+def _loss(values: Mapping[str, NDArray[Any]]) -> Columns:
+    return {} if struck_of(values) else {"fault.0.loss": values["loss"]}
+
+
+def _struck(count: int) -> Callable[[Mapping[str, NDArray[Any]]], Columns]:
+    def keys(values: Mapping[str, NDArray[Any]]) -> Columns:
+        loss = values.get("loss", np.ones(1))
+        which = np.asarray(values[STRUCK[count]], dtype=float)
+        return {f"fault.{number}.loss": np.where(which == number + 1.0, loss, 0.0) for number in range(count)}
+
+    return keys
+
+
+def _height(values: Mapping[str, NDArray[Any]]) -> Columns:
+    height = np.asarray(values["height"], dtype=float)
+    return {"ground.height": -height, "wind.altitude": np.maximum(height, LOWEST_GUSTS)}
 
 
 def _ramp(values: Mapping[str, NDArray[Any]]) -> Columns:
@@ -54,7 +91,8 @@ def _ramp(values: Mapping[str, NDArray[Any]]) -> Columns:
         raise InputError("axis 'ramp' needs 'onset', when it begins; give it as an axis or a draw too")
     onset = np.asarray(values["onset"], dtype=float)
     start, length = np.broadcast_arrays(onset, np.asarray(values["ramp"], dtype=float))
-    return {"fault.0.start": np.array(start), "fault.0.end": start + np.maximum(length, 1e-3)}
+    begin, end = np.array(start), start + np.maximum(length, 1e-3)
+    return {**_times(values, begin, "start"), **_times(values, end, "end")}
 
 
 def _noise(values: Mapping[str, NDArray[Any]]) -> Columns:
@@ -67,7 +105,17 @@ def _noise(values: Mapping[str, NDArray[Any]]) -> Columns:
 
 AXES: dict[str, Axis] = {
     "rotor": Axis("", "rotor of the first fault, from 1", _key("rotor", "fault.0.rotor"), (1, MOST_ROTORS)),
-    "loss": Axis("1", "loss of the first fault", _key("loss", "fault.0.loss"), (0.0, 1.0)),
+    "loss": Axis("1", "loss of the first fault", _loss, (0.0, 1.0)),
+    **{
+        name: Axis(
+            "", f"rotor that suffers 'loss', of {name[9:]}; the timeline has a fault for each in order",
+            _struck(count), (1, count),
+        )
+        for count, name in STRUCK.items()
+    },
+    "height": Axis(
+        "m", "height over ground of a flight about z = 0 (ground level, wind dryden)", _height, (0.1, 1000.0)
+    ),
     "onset": Axis("s", "time of the first fault", _onset, (0.0, np.inf)),
     "ramp": Axis("s", "length of the first fault's ramp (kind ramp), which begins at onset", _ramp, (0.0, np.inf)),
     "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, MOST_ROTORS)),

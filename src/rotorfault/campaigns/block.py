@@ -8,9 +8,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from rotorfault.campaigns.axes import columns
-from rotorfault.campaigns.flight_set import FlightSet, identifiers, seeds, values_of
-from rotorfault.campaigns.grades import grades
+from rotorfault.campaigns.flight_set import FlightSet, alike, columns_of, identifiers, seeds, values_of
+from rotorfault.campaigns.grading import judged
 from rotorfault.campaigns.study import Study
 from rotorfault.flight.many import fly_many
 from rotorfault.results.score_table import ScoreTable
@@ -19,6 +18,7 @@ METRICS = (
     "end_time", "cost", "tilt_max", "command_rate", "saturated_fraction", "outside_layer_fraction",
     "false_alarms", "largest_riccati_residual", "late_position_rms", "late_yaw_rms", "excursion",
     "position_mse.x", "position_mse.y", "position_mse.z", "given_up_fraction.yaw",
+    "position_error_end.x", "position_error_end.y", "position_error_end.z",
 )  # fmt: skip
 """Columns of `ScoreTable` that are kept; dots become underscores."""
 
@@ -39,7 +39,8 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         One row per flight in order: ``flight`` (within the block), ``id`` (within the campaign, see
         `rotorfault.campaigns.flight_set.identifiers`), ``variant``, ``cell``, ``number``, axes and draws by name,
         ``seed``, ``grade``, ``success`` (of the grade, by the study), ``survived`` (of the outcome), ``outcome``,
-        ``recovery_time`` [s], ``altitude_lost`` [m], and `METRICS`.
+        ``recovery_time`` [s], ``altitude_lost`` [m], `METRICS`, and what its
+        grading adds (`rotorfault.campaigns.detections`).
 
     Raises
     ------
@@ -47,17 +48,15 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         If a value is not allowed.
     """
     values, seed = values_of(study, flights), seeds(study, flights)
-    settings = {**columns(values), "seed": seed}
     parts: list[tuple[NDArray[np.intp], ScoreTable]] = []
-    for variant in np.unique(flights.variant):
-        which = np.flatnonzero(flights.variant == variant)
-        scenario = study.scenarios[variant]
-        varied = {key: column[which] for key, column in settings.items()}
+    for which, variant, cases in alike(study, flights):
+        here = {name: column[which] for name, column in values.items()}
+        varied = {**columns_of(study, here, cases), "seed": seed[which]}
         # What is hardly meant is said before the first block.
-        parts.append((which, fly_many(scenario, varied, threads=threads, warn=False).table))
+        parts.append((which, fly_many(study.scenario_of(variant, cases), varied, threads=threads, warn=False).table))
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     table = ScoreTable({k: v[order] for k, v in ScoreTable.joined([t for _, t in parts]).columns.items()})
-    grade = grades(table)
+    grade, found = judged(study.grading, table)
     rows: dict[str, NDArray[Any]] = {
         "flight": np.arange(flights.size, dtype=np.int64),
         "id": identifiers(study, flights),
@@ -73,6 +72,7 @@ def fly_block(study: Study, flights: FlightSet, threads: int | None = None) -> p
         "recovery_time": table["recovery_time"],
         "altitude_lost": table["altitude_lost"],
         **{name.replace(".", "_"): _metric(table, name) for name in METRICS},
+        **found,
     }
     return pa.table({name: _column(values) for name, values in rows.items()})
 

@@ -18,10 +18,11 @@ from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.config import read_text
 from rotorfault.base.errors import InputError, as_text, short
 from rotorfault.base.foreign import is_place
-from rotorfault.campaigns.axes import axis, columns
+from rotorfault.campaigns.axes import axis
 from rotorfault.campaigns.flight_set import FlightSet, values_of
+from rotorfault.campaigns.laid_out import of_controller
 from rotorfault.campaigns.studies import LONGEST_NAME
-from rotorfault.campaigns.study import Study, of_controller, study_from
+from rotorfault.campaigns.study import Study, study_from
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import with_whole_paths
 from rotorfault.scenario.preset_file import is_preset_file, name_of, record_in_file
@@ -40,6 +41,7 @@ def changed(
     preset: str | Sequence[str] | None = None,
     seed: int | None = None,
     budget: int | None = None,
+    quick: bool = False,
 ) -> Study:
     """The same study with something else in it.
 
@@ -59,6 +61,8 @@ def changed(
     seed : int, optional
     budget : int, optional
         Flights of all variants in all cells, at most.
+    quick : bool
+        Few flights in each cell and one round, of those values of axes that the study's ``[quick]`` keeps.
 
     Raises
     ------
@@ -68,7 +72,7 @@ def changed(
     tables = study.as_tables()
     named = [with_whole_paths(name) for name in _names(controllers)]
     given = with_files(settings)
-    if keys := [*([KIND] if named else []), *given]:
+    if keys := [*([KIND] if named else []), *(["vehicle"] if vehicle is not None else []), *given]:
         _require_fixed(study, keys)
     if vehicle is not None:
         for variant in tables["variant"]:
@@ -85,9 +89,26 @@ def changed(
         tables["overrides"] = {**tables["overrides"], **given}
     if seed is not None:
         tables["seed"] = seed
+    if quick:
+        _shorten(study, tables)
     if budget is not None:
         tables["refine"]["budget"] = budget
     return study_from(tables, study.name, allowed_with(study.allows_code, {KIND: named, **given}))
+
+
+def _shorten(study: Study, tables: dict[str, Any]) -> None:
+    """Leave few flights in each cell, and the values of axes that a short run keeps."""
+    flights = study.quick.flights
+    tables["refine"] = {"initial": flights, "block": flights, "most": flights, "level": study.refine.level}
+    for part, table in zip(study.axis, tables["axis"], strict=True):
+        kept = study.quick.keep.get(part.name)
+        if kept and part.case:
+            table["case"] = [case for case in table["case"] if case["label"] in kept]
+        elif kept:
+            table |= {"values": [value for value in part.grid if value in kept]}
+            for key in ("start", "stop", "count"):
+                table.pop(key, None)
+    tables["name"] = _shortened(tables["name"] + "-quick")
 
 
 def _give_preset(study: Study, tables: dict[str, Any], preset: str) -> None:
@@ -161,9 +182,10 @@ def with_files(settings: Mapping[str, Any] | None) -> dict[str, Any]:
 def _require_fixed(study: Study, keys: Sequence[str]) -> None:
     """Refuse to set what an axis or a draw varies: every flight would have the drawn value all the same."""
     one = FlightSet(*(np.zeros(1, dtype=np.int64) for _ in FlightSet._fields))
-    values = values_of(study, one)
-    for name in values:
-        varied = [key for key in columns(values) if key in axis(name).keys(values)]
+    of_cases = {part.name: [key for case in part.case for key in case.settings] for part in study.case_axes}
+    values = {name: column for name, column in values_of(study, one).items() if name not in of_cases}
+    keys_of = {name: list(axis(name).keys(values)) for name in values} | of_cases
+    for name, varied in keys_of.items():
         for key in keys:
             if any(key == each or key.startswith(f"{each}.") for each in varied):
                 raise InputError(

@@ -6,6 +6,7 @@ and that number alone, so that flight 17 of a cell meets the same wind under eve
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -15,8 +16,8 @@ from scipy.special import ndtri
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import record_line
-from rotorfault.campaigns.axes import axis
-from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.axes import Columns, axis, columns
+from rotorfault.campaigns.study import Cases, Study
 from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.noise import threefry
 
@@ -94,17 +95,88 @@ def seeds(study: Study, flights: FlightSet) -> Counts:
 
 
 def draws(study: Study, flights: FlightSet) -> dict[str, NDArray[Any]]:
-    """Values of the study's draws for each flight."""
-    if not study.draw:
+    """Values of the study's draws for each flight; of what is drawn in some cases alone, NaN or no text elsewhere."""
+    every = study.every_draw
+    if not every:
         return {}
     shares = _independent(study, flights) if study.design == "independent" else _designed(study, flights)
-    return {draw.name: _value(draw, share) for draw, share in zip(study.draw, shares.T, strict=True)}
+    found = {draw.name: _value(draw, share) for draw, share in zip(study.draw, shares.T, strict=False)}
+    if len(every) == len(study.draw):
+        return found
+    for which, _, cases in alike(study, flights):
+        for name, (number, draw) in study.draws_of(cases).items():
+            if number >= len(study.draw):
+                value = _value(draw, shares[which, number])
+                blank = np.full(flights.size, np.nan if value.dtype.kind == "f" else "", dtype=value.dtype)
+                column = found.setdefault(name, blank)
+                found[name] = column = column.astype(np.promote_types(column.dtype, value.dtype))
+                column[which] = value
+    return found
+
+
+class Alike(NamedTuple):
+    """Flights that have one scenario, before anything varies."""
+
+    which: NDArray[np.intp]  # of the flights
+    variant: int
+    cases: Cases
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+
+def alike(study: Study, flights: FlightSet) -> list[Alike]:
+    """Flights by what they fly: variant, and the case of each axis that has cases.
+
+    Parameters
+    ----------
+    study : Study
+    flights : FlightSet
+    """
+    codes = np.stack([flights.variant, *case_numbers(study, flights.cell)], axis=1)
+    kinds, place = np.unique(codes, axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    axes = study.case_axes
+    return [
+        Alike(
+            np.flatnonzero(place == number),
+            int(variant),
+            tuple(part.case[k] for part, k in zip(axes, chosen, strict=True)),
+        )
+        for number, (variant, *chosen) in enumerate(kinds.tolist())
+    ]
+
+
+def case_numbers(study: Study, cells: Counts) -> list[Counts]:
+    """For each axis of cases, which of them some cells have.
+
+    Parameters
+    ----------
+    study : Study
+    cells : ndarray of int, shape (N,)
+    """
+    places = np.unravel_index(cells, study.shape)
+    return [place for part, place in zip(study.axis, places, strict=True) if part.case]
+
+
+def columns_of(study: Study, values: Mapping[str, NDArray[Any]], cases: Cases) -> Columns:
+    """Columns of the scenario for flights of the same cases.
+
+    Parameters
+    ----------
+    study : Study
+    values : mapping of str to ndarray, shape (N,)
+        Of axes and draws, those flights alone; labels of cases, and draws of others, are left out.
+    cases : tuple of Case
+    """
+    known = {part.name for part in study.axis if not part.case} | set(study.draws_of(cases))
+    return columns({name: column for name, column in values.items() if name in known})
 
 
 def _independent(study: Study, flights: FlightSet) -> NDArray[np.float64]:
     """Independent uniform numbers, shape (flights, draws)."""
     shares = []
-    for k in range(len(study.draw)):
+    for k in range(len(study.every_draw)):
         word, _ = threefry(
             flights.number.astype(np.uint64), np.array(_DRAW_WORD + k, dtype=np.uint64),
             np.array(study.seed, dtype=np.uint64), flights.cell.astype(np.uint64),
@@ -115,10 +187,10 @@ def _independent(study: Study, flights: FlightSet) -> NDArray[np.float64]:
 
 def _designed(study: Study, flights: FlightSet) -> NDArray[np.float64]:
     """Numbers that fill the unit cube evenly within each cell, shape (flights, draws)."""
-    shares = np.empty((flights.size, len(study.draw)))
+    shares = np.empty((flights.size, len(study.every_draw)))
     for cell in np.unique(flights.cell):
         which = flights.cell == cell
-        points = _points(study.design, study.seed, int(cell), len(study.draw), study.refine.most)
+        points = _points(study.design, study.seed, int(cell), len(study.every_draw), study.refine.most)
         shares[which] = points[flights.number[which]]
     return shares
 
@@ -145,5 +217,8 @@ def _value(draw: Draw, share: NDArray[np.float64]) -> NDArray[Any]:
         mean, deviation = draw.normal
         low, high = axis(draw.name).range
         return np.asarray(np.clip(mean + deviation * ndtri(np.clip(share, 1e-16, 1.0 - 1e-16)), low, high))
+    if draw.sine is not None:
+        low, high = np.sin(draw.sine)
+        return np.asarray(np.arcsin(low + (high - low) * share))
     choices = np.array(draw.choice)
     return np.asarray(choices[np.minimum((share * len(choices)).astype(int), len(choices) - 1)])

@@ -20,9 +20,12 @@ flight, so that what happens right after a fault shows in its recovery and in th
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorfault.base.one_line import record_line
 from rotorfault.results.score_table import ScoreTable
 
 GRADES = ("held", "yaw given up", "degraded", "controlled descent", "drifted", "crashed", "lost")
@@ -35,6 +38,39 @@ BOUNDED = 2.0  # m
 YAW = 0.5  # rad
 DESCENT = 3.0  # m/s, as after a fall from 0.5 m
 UPRIGHT = np.radians(30.0)  # our choice: it comes down on its undercarriage, not on a rotor
+
+
+class Grading(NamedTuple):
+    """What flights of a study are judged by."""
+
+    success: tuple[str, ...]  # unless the study says otherwise
+    meanings: dict[str, str]  # of each grade, in order
+    about: str  # of all of them
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Grades in order."""
+        return tuple(self.meanings)
+
+
+FLIGHT = Grading(
+    SUCCESS,
+    {
+        "held": f"flew to its end; over the last half within {HELD:g} m (root mean square) and {YAW:g} rad of yaw",
+        "yaw given up": f"the same in position (up to {BOUNDED:g} m), but yaw was off by more",
+        "degraded": f"flew to its end with a bounded offset, {HELD:g} m to {BOUNDED:g} m",
+        "controlled descent": f"came down upright (within {np.degrees(UPRIGHT):.0f} degrees) at no more than "
+        f"{DESCENT:g} m/s, or landed",
+        "drifted": f"flew to its end, but more than {BOUNDED:g} m off",
+        "crashed": f"hit the ground faster than {DESCENT:g} m/s, or tilted by more than "
+        f"{np.degrees(UPRIGHT):.0f} degrees",
+        "lost": "tumbled, upside down in the air for half a second, or diverged: a state not finite or 10 km away",
+    },
+    "Numbers are taken over the last half of a flight.",
+)
 
 
 def grades(table: ScoreTable) -> NDArray[np.str_]:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from rotorfault.base.errors import InputError, unknown
-from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.block import METRICS
-from rotorfault.campaigns.flight_set import FlightSet, flight_of, seeds, values_of
+from rotorfault.campaigns.flight_set import FlightSet, columns_of, flight_of, seeds, values_of
 from rotorfault.campaigns.study import Study, study_from
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly
@@ -24,7 +23,8 @@ AGREE = 1e-9  # relative: what a number may differ by on another processor
 
 def settings_of(study: Study, flight: FlightSet) -> dict[str, Any]:
     """All that one flight has in place of its variant's scenario."""
-    settings = {key: column[0].item() for key, column in columns(values_of(study, flight)).items()}
+    found = columns_of(study, values_of(study, flight), study.cases_of(int(flight.cell[0])))
+    settings = {key: column[0].item() for key, column in found.items()}
     return {**settings, "seed": int(seeds(study, flight)[0])}
 
 
@@ -45,13 +45,13 @@ def replay(study: Study, identifier: int, changes: Mapping[str, Any] | None = No
         If there is no such flight, or a value is not allowed.
     """
     flight = flight_of(study, identifier)
-    number, drawn = int(flight.variant[0]), settings_of(study, flight)
+    number, drawn, cases = int(flight.variant[0]), settings_of(study, flight), study.cases_of(int(flight.cell[0]))
     if not changes:
-        return fly(study.scenario_of(number), settings=drawn)
+        return fly(study.scenario_of(number, cases), settings=drawn)
     tables = study.as_tables()
     # One variant alone: the others, and what code they need, are of no matter to this flight.
     tables |= {"overrides": {**tables["overrides"], **changes}, "variant": [tables["variant"][number]]}
-    scenario = study_from(tables, study.name, allowed_with(study.allows_code, changes)).scenario_of(0)
+    scenario = study_from(tables, study.name, allowed_with(study.allows_code, changes)).scenario_of(0, cases)
     kept = {key: value for key, value in drawn.items() if _has(scenario, key)}
     return fly(scenario, settings={**kept, **changes})
 
@@ -72,7 +72,7 @@ def is_changed(study: Study, identifier: int, changes: Mapping[str, Any]) -> boo
         If there is no such flight, or a key leads nowhere.
     """
     flight = flight_of(study, identifier)
-    tables = study.tables_of(int(flight.variant[0]))
+    tables = study.tables_of(int(flight.variant[0]), study.cases_of(int(flight.cell[0])))
     override_all(tables, settings_of(study, flight))
     after = copy.deepcopy(tables)
     override_all(after, copy.deepcopy(dict(changes)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
-from rotorfault.campaigns.flight_set import Counts, FlightSet
+from rotorfault.campaigns.flight_set import Counts, FlightSet, case_numbers
 from rotorfault.campaigns.sampling.refine import further_flights
 from rotorfault.campaigns.study import Study
 
@@ -44,7 +44,12 @@ def next_round(study: Study, successes: Counts, trials: Counts) -> FlightSet:
     """
     grid = (len(study.variant), *study.shape)
     further = further_flights(successes.reshape(grid), trials.reshape(grid), study.refine)
-    return _in_order(further.reshape(trials.shape), trials)
+    flights = _in_order(further.reshape(trials.shape), trials)
+    if not study.case_axes:
+        return flights
+    # Cells of the same cases together: a block has fewer loops then. What order they are flown in changes no number.
+    keys = (flights.number, flights.cell, *reversed(case_numbers(study, flights.cell)), flights.variant)
+    return flights.part(np.lexsort(keys))
 
 
 def _in_order(further: Counts, trials: Counts) -> FlightSet:

@@ -18,9 +18,8 @@ import pyarrow as pa
 
 from rotorfault.base.resumable import Executor, Task, run_missing
 from rotorfault.base.versions import source_digest
-from rotorfault.campaigns.axes import columns
 from rotorfault.campaigns.block import fly_block
-from rotorfault.campaigns.flight_set import FlightSet, values_of
+from rotorfault.campaigns.flight_set import FlightSet, alike, columns_of, values_of
 from rotorfault.campaigns.rounds import Tally, blocks, next_round
 from rotorfault.campaigns.store.folder import FLIGHTS, STUDY
 from rotorfault.campaigns.store.identity import read_identity
@@ -32,7 +31,7 @@ from rotorfault.flight.sweep import checked_columns, groups_of
 BYTES_PER_FLIGHT = 400
 ROOMS = (
     "campaigns/sampling", "campaigns/axes.py", "campaigns/block.py", "campaigns/flight_set.py", "campaigns/grades.py",
-    "campaigns/rounds.py", "campaigns/study.py", "campaigns/varied.py",
+    "campaigns/rounds.py", "campaigns/detections.py", "campaigns/study.py", "campaigns/varied.py",
 )  # fmt: skip
 """Of the campaigns' source, what decides which flights there are and what their rows say."""
 Say = Callable[[str], None]
@@ -84,11 +83,14 @@ def check(study: Study) -> None:
         If a scenario, a key or a value is not allowed.
     """
     cells = np.arange(study.cells)
-    for variant, scenario in enumerate(study.scenarios):
+    for variant in range(len(study.variant)):
         one_each = FlightSet(np.full(len(cells), variant), cells, np.zeros(len(cells), dtype=np.int64))
-        settings = checked_columns(scenario, dict(columns(values_of(study, one_each))))
-        for group in groups_of(scenario, settings):
-            assemble_group(group)
+        values = values_of(study, one_each)
+        for which, _, cases in alike(study, one_each):
+            scenario = study.scenario_of(variant, cases)
+            own = columns_of(study, {name: column[which] for name, column in values.items()}, cases)
+            for group in groups_of(scenario, checked_columns(scenario, {**own, "seed": np.zeros(len(which), int)})):
+                assemble_group(group)
 
 
 def fly(study: Study, store: Store, executor: Executor, say: Say = lambda _: None) -> Progress:

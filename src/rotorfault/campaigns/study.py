@@ -8,33 +8,32 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Collection
-from importlib import resources
-from pathlib import Path
+from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base import foreign
-from rotorfault.base.config import Strict, parse_toml, read_text, refusal, validate
+from rotorfault.base.config import Strict, refusal, validate
 from rotorfault.base.errors import InputError, as_text, unknown
 from rotorfault.base.one_line import LONGEST, cut
-from rotorfault.campaigns.grades import GRADES, SUCCESS
+from rotorfault.campaigns.grading import GRADINGS, Judge
+from rotorfault.campaigns.laid_out import laid_out, of_controller
 from rotorfault.campaigns.sampling.refine import Refinement
-from rotorfault.campaigns.studies import FOLDER, LONGEST_NAME, NAME, study_names
-from rotorfault.campaigns.varied import Draw, GridAxis, know_rotors
-from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.library import is_file, load_scenario, with_whole_paths
+from rotorfault.campaigns.studies import LONGEST_NAME, NAME
+from rotorfault.campaigns.varied import Case, Draw, GridAxis, Quick, know_rotors
+from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.overrides import override_all
-from rotorfault.scenario.preset_file import beside, is_preset_file
 from rotorfault.scenario.scenario import Scenario, scenario_from
 
 MOST_FLIGHTS = 20_000_000  # beyond it somebody has made a mistake
 MOST_CELLS = 100_000
+SUMMARIES = ("total-loss", "detection")
+Cases = tuple[Case, ...]
 
 
 class Variant(Strict):
@@ -73,23 +72,39 @@ class Study(Strict):
         default={}, description="dotted keys and values for all flights, over those of the variants"
     )
     refine: Refinement = Field(default=Refinement(), description="how many flights a cell gets")
-    success: tuple[str, ...] = Field(default=SUCCESS, min_length=1, description="grades that count as success")
+    grading: Judge = Field(default="flight", description="what is judged: flight | detection")
+    success: tuple[str, ...] = Field(
+        default=(), min_length=1, description="grades that count as success; those of the grading if not given"
+    )
+    summary: str = Field(
+        default="", description="name of a summary that is written at the end: total-loss | detection"
+    )
+    quick: Quick = Field(default=Quick(), description="[quick] table: what `--quick` flies")
 
     _allow_code: bool | Collection[str] = PrivateAttr(default=False)  # whether code that it names may run, or which
-
-    @field_validator("success")
-    @classmethod
-    def _grades(cls, value: tuple[str, ...]) -> tuple[str, ...]:
-        for grade in value:
-            if grade not in GRADES:
-                raise ValueError(unknown("grade", grade, list(GRADES)))
-        return value
+    _scenarios: dict[Any, Scenario] = PrivateAttr(default_factory=dict)  # those that were asked for
 
     @model_validator(mode="after")
     def _consistent(self) -> Study:
+        known = GRADINGS[self.grading]
+        for grade in self.success:
+            if grade not in known.names:
+                raise refusal("success", unknown("grade", grade, list(known.names)))
+        if not self.success:
+            object.__setattr__(self, "success", known.success)
+        if self.summary and self.summary not in SUMMARIES:
+            raise refusal("summary", unknown("summary", self.summary, list(SUMMARIES)))
+        for part in self.axis:
+            for value in self.quick.keep.get(part.name, ()):
+                if value not in part.grid:
+                    raise refusal(
+                        "quick.keep", unknown(part.name, as_text(value), [as_text(one) for one in part.grid])
+                    )
         names = [part.name for part in self.axis] + [part.name for part in self.draw]
         if len(set(names)) < len(names):
             raise refusal("axis", f"{max(names, key=names.count)} is varied twice; vary it once")
+        if both := {draw.name for draw in self.every_draw} & {part.name for part in self.axis}:
+            raise refusal("axis", f"{min(both)} is varied by an axis, and drawn in a case; vary it once")
         labels = [variant.label for variant in self.variant]
         if len(set(labels)) < len(labels):
             raise refusal("variant", f"two variants are called '{max(labels, key=labels.count)}'")
@@ -161,48 +176,21 @@ class Study(Strict):
         InputError
             If a file cannot be read.
         """
-        tables = self.as_tables()
-        if isinstance(self.scenario, str):
-            try:
-                tables["scenario"] = self.scenario_tables()
-            except InputError as error:
-                raise InputError(f"study '{self.name}': {error}") from None
-        tables["scenario"] = with_whole_paths(tables["scenario"])
-        tables |= {key: with_whole_paths(tables[key]) for key in ("settings", "overrides", "variant")}
-        each = (tables["settings"], tables["overrides"], *(variant["settings"] for variant in tables["variant"]))
-        for settings in each:
-            if as_text(settings.get("vehicle", "")).endswith(".toml"):
-                settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
-        self._lay_out_presets(tables)
-        return study_from(tables, self.name, self._allow_code)
-
-    def _lay_out_presets(self, tables: dict[str, Any]) -> None:
-        """Put the settings of presets from files in place of the files, in the tables of the study."""
-        common = (tables["settings"], tables["overrides"])
-        everywhere = any(_names_preset_file(settings) for settings in (tables["scenario"], *common))
-        for number, variant in enumerate(tables["variant"]):
-            if everywhere or _names_preset_file(variant["settings"]):
-                part = self.scenario_of(number)[CONTROLLER]
-                rest = {key: value for key, value in variant["settings"].items() if not of_controller(key)}
-                variant["settings"] = {**rest, CONTROLLER.name: part.as_table()}
-        if everywhere:
-            for settings in common:
-                for key in [key for key in settings if of_controller(key)]:
-                    del settings[key]
+        return study_from(laid_out(self), self.name, self._allow_code)
 
     @property
     def own_sources(self) -> dict[str, str]:
         """Digest of the source of each part from outside the package, by its place in code."""
         varied = self._varied_code().items()
         digests = {place: foreign.source_digest(foreign.load(place, what)) for place, what in varied}
-        for scenario in self.scenarios:
+        for scenario in self.one_by_one:
             digests |= sources_of(scenario)
         return digests
 
     def _varied_code(self) -> dict[str, str]:
         """Places in code among the values of axes and draws, with what they are."""
-        varied = [(part.name, part.grid) for part in self.axis]
-        varied += [(draw.name, list(draw.choice or ())) for draw in self.draw]
+        varied = [(part.name, part.grid) for part in self.axis if not part.case]
+        varied += [(draw.name, list(draw.choice or ())) for draw in self.every_draw]
         return {
             value: name.partition(".")[0]
             for name, values in varied
@@ -218,7 +206,7 @@ class Study(Strict):
 
     @functools.cached_property
     def scenarios(self) -> tuple[Scenario, ...]:
-        """What each variant flies, before anything varies.
+        """What each variant flies, before anything varies; on axes of cases the first of them.
 
         Raises
         ------
@@ -227,19 +215,58 @@ class Study(Strict):
         """
         return tuple(self.scenario_of(number) for number in range(len(self.variant)))
 
-    def scenario_of(self, number: int) -> Scenario:
+    @property
+    def one_by_one(self) -> tuple[Scenario, ...]:
+        """What each variant flies in each case, with the first of the other axes: every setting is in one of them."""
+        first = self.first_cases
+        others = [
+            (*first[:k], case, *first[k + 1 :]) for k, part in enumerate(self.case_axes) for case in part.case[1:]
+        ]
+        return (*self.scenarios, *(self.scenario_of(n, cases) for n in range(len(self.variant)) for cases in others))
+
+    @property
+    def case_axes(self) -> tuple[GridAxis, ...]:
+        """Axes whose values are cases."""
+        return tuple(part for part in self.axis if part.case)
+
+    @property
+    def first_cases(self) -> Cases:
+        """The first case of each such axis."""
+        return tuple(part.case[0] for part in self.case_axes)
+
+    def cases_of(self, cell: int) -> Cases:
+        """The cases of a cell, one for each axis of cases.
+
+        Parameters
+        ----------
+        cell : int
+            Counted row by row.
+        """
+        places = np.unravel_index(cell, self.shape)
+        return tuple(part.case[place] for part, place in zip(self.axis, places, strict=True) if part.case)
+
+    def scenario_of(self, number: int, cases: Cases | None = None) -> Scenario:
         """What one variant flies, before anything varies; code that only others name need not be allowed.
 
         Parameters
         ----------
         number : int
             Place of the variant, from 0 on.
+        cases : tuple of Case, optional
+            One of each axis that has cases; the first of each if not given.
 
         Raises
         ------
         InputError
             As for `scenarios`.
         """
+        chosen = self.first_cases if cases is None else cases
+        key = (number, tuple(case.label for case in chosen))
+        if key not in self._scenarios:
+            self._scenarios[key] = self._scenario_of(number, chosen)
+        return self._scenarios[key]
+
+    def _scenario_of(self, number: int, cases: Cases) -> Scenario:
         for place, what in self._varied_code().items():
             try:
                 foreign.require_allowed(place, self._allow_code, what)
@@ -247,9 +274,9 @@ class Study(Strict):
                 raise InputError(f"study '{self.name}': {error}") from None
         variant = self.variant[number]
         try:
-            return self._scenario({**self.settings, **variant.settings})
+            return self._scenario(self._settings_of(number, cases))
         except InputError as error:
-            where = f"variant '{variant.label}'"
+            where = f"variant '{variant.label}'" + "".join(f", case '{case.label}'" for case in cases)
             try:
                 self._scenario(self.settings)
             except InputError as without:
@@ -257,15 +284,40 @@ class Study(Strict):
                 where = f"study '{self.name}'" if str(without) == str(error) else where
             raise InputError(f"{where}: {error}") from None
 
-    def tables_of(self, number: int) -> dict[str, Any]:
+    def _settings_of(self, number: int, cases: Cases) -> dict[str, Any]:
+        """Settings of all flights, under those of the cases, under those of the variant."""
+        variant = self.variant[number].settings
+        found = dict(self.settings)
+        for case in cases:
+            found |= {key: value for key, value in case.settings.items() if _is_for(variant, key, value)}
+        return found | variant
+
+    def tables_of(self, number: int, cases: Cases | None = None) -> dict[str, Any]:
         """The tables of the scenario that one variant flies, unchecked: none of the code that they name runs.
 
         Parameters
         ----------
         number : int
             Place of the variant, from 0 on.
+        cases : tuple of Case, optional
+            One of each axis that has cases; the first of each if not given.
         """
-        return self._tables({**self.settings, **self.variant[number].settings})
+        return self._tables(self._settings_of(number, self.first_cases if cases is None else cases))
+
+    def draws_of(self, cases: Cases) -> dict[str, tuple[int, Draw]]:
+        """What is drawn in flights of some cases, by name, with the number of the draw that names its random numbers.
+
+        Parameters
+        ----------
+        cases : tuple of Case
+        """
+        own = {id(draw): k for k, draw in enumerate(self.every_draw)}
+        return {draw.name: (own[id(draw)], draw) for draw in (*self.draw, *(d for case in cases for d in case.draw))}
+
+    @property
+    def every_draw(self) -> tuple[Draw, ...]:
+        """Draws of all flights, then those of cases."""
+        return (*self.draw, *(draw for part in self.case_axes for case in part.case for draw in case.draw))
 
     def _scenario(self, settings: dict[str, Any]) -> Scenario:
         tables = self._tables(settings)
@@ -295,16 +347,14 @@ class Study(Strict):
         return study_from, (self.as_tables(), self.name, self._allow_code)
 
 
-def of_controller(key: str) -> bool:
-    """Whether a dotted key of a scenario is one of its controller."""
-    return key.partition(".")[0] == CONTROLLER.name
-
-
-def _names_preset_file(settings: dict[str, Any]) -> bool:
-    """Whether settings name a preset of the controller by its file."""
-    table = settings.get(CONTROLLER.name)
-    inner = table.get("preset") if isinstance(table, dict) else None
-    return is_preset_file(settings.get(f"{CONTROLLER.name}.preset")) or is_preset_file(inner)
+def _is_for(variant: Mapping[str, Any], key: str, value: Any) -> bool:
+    """Whether a setting of a case is for the controller of a variant: that of one law is none of another's."""
+    kind = as_text(variant.get(f"{CONTROLLER.name}.kind", ""))
+    if not (of_controller(key) and kind):
+        return True
+    if foreign.is_place(kind):
+        return False
+    return key != f"{CONTROLLER.name}.preset" or CONTROLLER.presets is None or value in CONTROLLER.presets(kind)
 
 
 def sources_of(scenario: Scenario) -> dict[str, str]:
@@ -315,52 +365,6 @@ def sources_of(scenario: Scenario) -> dict[str, str]:
     scenario : Scenario
     """
     return {place: digest for _, part in scenario.parts() for place, digest in part.sources.items()}
-
-
-def load_study(name_or_path: str | Path, changes: dict[str, Any] | None = None, *, allow_code: bool = False) -> Study:
-    """Load and check a study.
-
-    Parameters
-    ----------
-    name_or_path : str or Path
-        Name of a built-in study, or a path that ends in ``.toml``.
-    changes : dict, optional
-        Top-level keys to be replaced.
-    allow_code : bool
-        Whether code that the study names may run.
-
-    Raises
-    ------
-    InputError
-        If there is no such study, or it is not right; one line with file and key.
-    """
-    if str(name_or_path).endswith(".toml"):
-        where, text = str(name_or_path), read_text(name_or_path)
-    else:
-        name, names = str(name_or_path), study_names()
-        if name not in names:
-            raise InputError(f"{unknown('study', name, names)}; or give a path that ends in .toml")
-        where = f"{name}.toml"
-        text = (resources.files(FOLDER) / where).read_text(encoding="utf-8")
-    tables = parse_toml(text, where) | (changes or {})
-    if str(name_or_path).endswith(".toml"):
-        _relative_to(Path(name_or_path).parent, tables)
-    return study_from(tables, where, allow_code)
-
-
-def _relative_to(folder: Path, tables: dict[str, Any]) -> None:
-    """Make the paths in a study file relative to the file."""
-    if as_text(tables.get("scenario", "")).endswith(".toml"):
-        tables["scenario"] = str(folder / tables["scenario"])
-    variants = tables.get("variant", [])
-    owners = [tables, *(variants if isinstance(variants, list) else [])]
-    each: list[Any] = [owner.get("settings") for owner in owners if isinstance(owner, dict)]
-    for settings in [*each, tables.get("overrides")]:
-        for key, value in settings.items() if isinstance(settings, dict) else ():
-            if is_file(value) or (key == "vehicle" and as_text(value).endswith(".toml")):
-                settings[key] = str(folder / value)
-            if key == f"{CONTROLLER.name}.preset":
-                settings[key] = beside(folder, value)
 
 
 def study_from(tables: dict[str, Any], where: str, allow_code: bool | Collection[str] = False) -> Study:

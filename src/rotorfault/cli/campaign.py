@@ -55,6 +55,9 @@ def campaign(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed in place of the study's.")] = None,
     budget: Annotated[int | None, typer.Option(min=1, help="Most flights, in place of the study's.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Few flights and cells, in a minute or so, to see what the study is like.")
+    ] = False,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
     report_only: Annotated[
         bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
@@ -104,7 +107,8 @@ def campaign(
     try:
         done = fly_campaign(
             study, out, resume=resume, repair=repair, controllers=controllers or (), settings=settings,
-            vehicle=vehicle, preset=presets, seed=seed, budget=budget, workers=workers, scheduler=scheduler,
+            vehicle=vehicle, preset=presets, seed=seed, budget=budget, quick=quick, workers=workers,
+            scheduler=scheduler,
             say=lambda line: say(line, err=True), allow_code=allow_code,
         )  # fmt: skip
     except KeyboardInterrupt as stop:

@@ -178,7 +178,7 @@ def _check_scenario(path: Path, allow_code: bool) -> tuple[str, list[str]]:
 
 def _check_study(path: Path, allow_code: bool) -> tuple[str, list[str]]:
     from rotorfault.campaigns import run
-    from rotorfault.campaigns.study import load_study
+    from rotorfault.campaigns.load import load_study
     from rotorfault.flight.reference_rows import unflown
 
     study = load_study(path, allow_code=allow_code).resolved()

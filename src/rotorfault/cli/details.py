@@ -265,12 +265,13 @@ def study_text(name: str) -> str:
         Of a study, or the path of its file; code that it names does not run.
     """
     from rotorfault.campaigns.axes import axis
-    from rotorfault.campaigns.study import load_study
+    from rotorfault.campaigns.load import load_study
 
     study = load_study(name)
     rows = [["varied", "values", "unit", "meaning"]]
     for part in study.axis:
-        rows.append([part.name, _grid(part.grid), axis(part.name).unit, axis(part.name).about])
+        known = ("", "cases, each with settings of its own") if part.case else axis(part.name)[:2]
+        rows.append([part.name, _grid(part.grid), *known])
     for draw in study.draw:
         rows.append([draw.name, _drawn(draw), axis(draw.name).unit, axis(draw.name).about])
     each = [["variant", "settings"], *([one.label, _assigned(one.settings)] for one in study.variant)]
@@ -305,6 +306,8 @@ def _drawn(draw: Draw) -> str:
         return "uniform, {:g} to {:g}".format(*draw.uniform)
     if draw.normal is not None:
         return "normal, mean {:g}, deviation {:g}".format(*draw.normal)
+    if draw.sine is not None:
+        return "of uniform sine, {:g} to {:g}".format(*draw.sine)
     return f"one of {_listed(draw.choice or ())}"
 
 

@@ -35,6 +35,7 @@ from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 from rotorfault.plant.faults import FAULT
 from rotorfault.plant.ground import GROUND
+from rotorfault.plant.models import PLANT
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part, field_of
@@ -66,19 +67,6 @@ class Start(Strict):
     charge: float | None = Field(
         default=None, gt=0.0, le=1.0, description="of the battery, 1 full; the voltage is constant if not given"
     )
-
-    @model_validator(mode="after")
-    def _upright(self) -> Start:
-        roll, pitch, _ = self.attitude
-        if (cosine := math.cos(roll) * math.cos(pitch)) < 0.0:
-            tilt = f"a tilt of {math.degrees(math.acos(cosine)):.4g} degrees"
-            meant = f"if degrees were meant, write [{math.radians(roll):.4g}, {math.radians(pitch):.4g}, ...]"
-            raise refusal(
-                "attitude",
-                f"got roll {roll:g} and pitch {pitch:g} rad, {tilt}; allowed: up to 90 degrees, beyond which a "
-                f"flight is lost; {meant}",
-            )
-        return self
 
 
 def _vehicle(value: Any) -> VehicleFile:
@@ -189,6 +177,7 @@ class Scenario(Strict):
             )
         self._require_battery()
         require_flyable(self.mismatch.applied(self.vehicle), self.grid)
+        self._require_upright()
         count = len(self.vehicle.rotor)
         for number, fault in enumerate(self.all(FAULT)):
             hit = getattr(fault.settings, "rotor", 1)
@@ -204,6 +193,16 @@ class Scenario(Strict):
             elif (one := self.maybe(slot)) is not None:
                 require_on_grid(one, slot.name, self.grid)
         return self
+
+    def _require_upright(self) -> None:
+        roll, pitch, _ = self.start.attitude
+        cosine = math.cos(roll) * math.cos(pitch)
+        if cosine < 0.0 and not getattr(self[PLANT].factory, "upside_down", 0.0) > 0.0:
+            raise refusal(
+                "start.attitude",
+                f"got roll {roll:g} and pitch {pitch:g} rad, {math.degrees(math.acos(cosine)):.4g} degrees of tilt; "
+                f"allowed with plant '{self[PLANT].kind}': up to 90 degrees, where its equations of motion end",
+            )
 
     def _require_battery(self) -> None:
         name = cut(self.vehicle.name)

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.grading import GRADINGS
 from rotorfault.campaigns.report.axis_drawing import borders, coarse, columns, label, legend_columns, places, scale_x
 from rotorfault.campaigns.report.line_figure import join, look
 from rotorfault.campaigns.report.maps import PROBABILITIES, Maps
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, new_figure, padded, shown
 
-GRADE_COLOURS = dict(zip(GRADES, (BLUE, SKY, GREEN, "#F0E442", ORANGE, VERMILION, "0.35"), strict=True))
+COLOURS = (BLUE, SKY, GREEN, "#F0E442", ORANGE, VERMILION, "0.35")  # of grades in order
 BESIDE = 0.6  # share of a cell over which marks of variants are spread
 LEAST_HIGH = 1.0  # s or m: top of an axis on which all is 0
 
@@ -32,7 +32,9 @@ def grade_figure(maps: Maps) -> Figure:
     x = maps.views[0]
     edges, widths = borders(x)[:-1], np.diff(borders(x))
     # Successes below, so that the line above them is the success rate.
-    order = [g for g in GRADES if g in maps.study.success] + [g for g in GRADES if g not in maps.study.success]
+    names = GRADINGS[maps.study.grading].names
+    colours = dict(zip(names, COLOURS, strict=True))
+    order = [g for g in names if g in maps.study.success] + [g for g in names if g not in maps.study.success]
     for k, axes in enumerate(grid.flat):
         if k >= len(maps.variants):
             axes.set_visible(False)
@@ -41,13 +43,13 @@ def grade_figure(maps: Maps) -> Figure:
         shares = np.nan_to_num(variant.shares)
         below = np.zeros(shares.shape[1])
         for grade in order:
-            share = shares[GRADES.index(grade)]
+            share = shares[names.index(grade)]
             axes.bar(
-                edges, share, widths, bottom=below, align="edge", color=GRADE_COLOURS[grade], edgecolor="white",
+                edges, share, widths, bottom=below, align="edge", color=colours[grade], edgecolor="white",
                 linewidth=0.3 if len(widths) < 60 else 0.0,
             )  # fmt: skip
             below = below + share
-        success_rate = sum(variant.shares[GRADES.index(grade)] for grade in maps.study.success)
+        success_rate = sum(variant.shares[names.index(grade)] for grade in maps.study.success)
         axes.stairs(np.asarray(success_rate), borders(x), color=BLACK, linewidth=1.2, baseline=None)
         axes.set_title(shown(variant.label, 30))
         axes.grid(visible=False)
@@ -58,8 +60,8 @@ def grade_figure(maps: Maps) -> Figure:
             axes.set_xlabel(label(x))
     scale_x(grid[0, 0], x, 9 if across <= 2 else 6)
     grid[0, 0].set_ylim(0.0, 1.0)
-    present = [g for g in order if any(np.nansum(v.shares[GRADES.index(g)]) > 0.0 for v in maps.variants)]
-    handles: list[Artist] = [Patch(facecolor=GRADE_COLOURS[grade], label=grade) for grade in present]
+    present = [g for g in order if any(np.nansum(v.shares[names.index(g)]) > 0.0 for v in maps.variants)]
+    handles: list[Artist] = [Patch(facecolor=colours[grade], label=grade) for grade in present]
     handles.append(Line2D([], [], color=BLACK, linewidth=1.2, label="success"))
     across = legend_columns([*present, "success"])
     figure.legend(handles=handles, loc="outside upper center", ncols=across)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.grading import GRADINGS
 from rotorfault.campaigns.report.answer import signed
 from rotorfault.campaigns.report.axis_drawing import (
     DIFFERENCE_COLOURS,
@@ -64,7 +64,7 @@ def variant_cells(maps: Maps, k: int, folder: Path) -> NDArray[np.object_]:
     cells = np.empty(variant.cell.shape, dtype=object)
     for at in np.ndindex(*variant.cell.shape):
         page = link(folder, example(maps.study, variant, at))
-        cells[at] = CellNote(place_text(maps, at), _numbers(variant, at), *_replay(variant, at, folder), page)
+        cells[at] = CellNote(place_text(maps, at), _numbers(maps, variant, at), *_replay(variant, at, folder), page)
     return cells
 
 
@@ -156,11 +156,12 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
 # ------------------------------------------------------------------------------------------------ what cells say
 
 
-def _numbers(variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
+def _numbers(maps: Maps, variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
     flights, successes = int(variant.flights[at]), int(variant.successes[at])
     if not flights:
         return ("no flights", f"hover can be controlled: {possible_text(variant.possible, at)}")
-    grades = ", ".join(f"{name} {n}" for name, n in zip(GRADES, _of(variant.grades, at), strict=True) if n)
+    names = GRADINGS[maps.study.grading].names
+    grades = ", ".join(f"{name} {n}" for name, n in zip(names, _of(variant.grades, at), strict=True) if n)
     return (
         f"success {successes} of {flights}: {percent(variant.success_rate[at])} "
         f"({percent(variant.lower[at])} to {percent(variant.upper[at])})",

@@ -16,7 +16,7 @@ from rotorfault.base.plain_text import argument
 from rotorfault.campaigns.axes import axis
 from rotorfault.campaigns.report.maps import Maps, View
 from rotorfault.campaigns.study import Study
-from rotorfault.campaigns.varied import Draw
+from rotorfault.campaigns.varied import Case, Draw, GridAxis
 from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.scenario import Scenario
@@ -150,8 +150,9 @@ def _facts(maps: Maps, versions: Mapping[str, str]) -> tuple[Fact, ...]:
         Fact("vehicle", tuple(_vehicles(study, names))),
         Fact("scenario", _scenario(study)),
         Fact("settings of all", (_settings(study.settings),) if study.settings else ()),
-        Fact("axes", tuple(_axis(view) for view in maps.views)),
+        Fact("axes", tuple(_axis(view, study) for view in maps.views)),
         Fact("draws", tuple(_draw(draw) for draw in study.draw) or ("nothing",)),
+        Fact("cases", tuple(_case(part, case) for part in study.case_axes for case in part.case)),
         Fact("design", (DESIGNS[study.design],) if study.draw else ()),
         Fact("flights", _sampling(maps)),
         Fact("seed", (f"{study.seed}; {SEEDS}",)),
@@ -260,8 +261,15 @@ def _value(value: Any) -> str:
     return text if len(text) <= 200 else f"{text[:200]} …"
 
 
-def _axis(view: View) -> str:
-    about = axis(view.name).about
+def _case(part: GridAxis, case: Case) -> str:
+    drawn = [_draw(draw) for draw in case.draw]
+    said = "; ".join([*([_settings(case.settings)] if case.settings else []), *drawn])
+    return f"{part.name.replace('_', ' ')} “{case.label}”: {said or 'as it is'}"
+
+
+def _axis(view: View, study: Study) -> str:
+    of_cases = view.name in {part.name for part in study.case_axes}
+    about = "cases" if of_cases else axis(view.name).about
     count = len(view.values)
     ends = f"{view.text(0)} to {view.text(count - 1)}{_after(view.unit)}"
     steps = np.diff(view.positions)
@@ -281,6 +289,8 @@ def _draw(draw: Draw) -> str:
         law = f"uniform, {draw.uniform[0]:.4g} to {draw.uniform[1]:.4g}{unit}"
     elif draw.normal is not None:
         law = f"normal, mean {draw.normal[0]:.4g}, standard deviation {draw.normal[1]:.4g}{unit}"
+    elif draw.sine is not None:
+        law = f"with uniform sine, {draw.sine[0]:.4g} to {draw.sine[1]:.4g}{unit}"
     else:
         law = f"{_either([f'{v:g}' if isinstance(v, float) else v for v in draw.choice or ()])}{unit}, equally likely"
     return f"{draw.name.replace('_', ' ')} ({known.about}): {law}"

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from rotorfault.analysis.hover import hover_controlled
 from rotorfault.base.one_line import record_line
-from rotorfault.campaigns.axes import Columns, columns
-from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.axes import Columns
+from rotorfault.campaigns.flight_set import columns_of
+from rotorfault.campaigns.study import Cases, Study
 from rotorfault.campaigns.varied import Draw
 from rotorfault.engine.batch import columns as rows_of
 from rotorfault.flight.assembly import Group, numbers_of
@@ -77,17 +78,40 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
         Each of shape (N,). None where it is not known: a fault whose loss depends on the command, a wind that pushes
         by more than its mean velocity, or too many draws.
     """
-    scenario = study.scenarios[variant]
     count = len(next(iter(values.values())))
-    draws = [draw for draw in study.draw if _matters(study, scenario, draw)]
+    if not study.case_axes:
+        return _limits_of(study, variant, (), values, middle)
+    found = Limits(np.full(count, np.nan), np.full(count, np.nan))
+    chosen = list(zip(*(values[part.name].tolist() for part in study.case_axes), strict=True))
+    for labels in dict.fromkeys(chosen):
+        cases = tuple(
+            next(case for case in part.case if case.label == label)
+            for part, label in zip(study.case_axes, labels, strict=True)
+        )
+        which = np.array([one == labels for one in chosen])
+        here = _limits_of(study, variant, cases, {name: column[which] for name, column in values.items()}, middle)
+        if here is not None:
+            found.with_yaw[which], found.without_yaw[which] = here
+    return None if all(np.isnan(each).all() for each in found) else found
+
+
+def _limits_of(
+    study: Study, variant: int, cases: Cases, values: Mapping[str, NDArray[Any]], middle: bool
+) -> Limits | None:
+    """The same where all flights have the same cases."""
+    scenario, count = study.scenario_of(variant, cases), len(next(iter(values.values())))
+    every = [draw for _, draw in study.draws_of(cases).values()]
+    here = _Flights(study, scenario, cases, every, {n: v for n, v in values.items() if n not in _names(study)})
+    draws = [draw for draw in every if _matters(here, draw)]
     ends = [_ends(draw, middle) for draw in draws]
     if np.prod([len(e) for e in ends], initial=1.0) > MOST_ENDS:
         return None
     answers = []
     for chosen in itertools.product(*ends):
         drawn = {draw.name: np.full(count, value) for draw, value in zip(draws, chosen, strict=True)}
-        others = {d.name: np.full(count, _ends(d, True)[0]) for d in study.draw if d not in draws}
-        physics = _physics(scenario, columns({**values, **drawn, **others}), count)
+        others = {d.name: np.full(count, _ends(d, True)[0]) for d in every if d not in draws}
+        varied = columns_of(study, {**here.values, **drawn, **others}, cases)
+        physics = _physics(scenario, {**varied, "seed": np.zeros(count, int)}, count)
         if physics is None:
             return None
         answers.append([np.broadcast_to(one, (count,)) for one in hover_controlled(*physics)])
@@ -96,12 +120,27 @@ def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, mi
     return Limits(*np.where(every == some, every, every if middle else np.nan))
 
 
-def _matters(study: Study, scenario: Scenario, draw: Draw) -> bool:
+class _Flights(NamedTuple):
+    """Flights of one scenario."""
+
+    study: Study
+    scenario: Scenario
+    cases: Cases
+    draws: list[Draw]
+    values: dict[str, NDArray[Any]]  # of axes that are no cases, shape (N,)
+
+
+def _names(study: Study) -> set[str]:
+    return {part.name for part in study.case_axes}
+
+
+def _matters(flights: _Flights, draw: Draw) -> bool:
     """Whether a draw changes losses, wind or vehicle; most only change what happens on the way."""
     ends = _ends(draw, middle=False)
-    first = {part.name: np.full(len(ends), part.grid[0]) for part in study.axis}
-    others = {other.name: np.full(len(ends), _ends(other, True)[0]) for other in study.draw}
-    physics = _physics(scenario, columns({**first, **others, draw.name: np.array(ends)}), len(ends))
+    first = {name: np.full(len(ends), column[0]) for name, column in flights.values.items()}
+    others = {other.name: np.full(len(ends), _ends(other, True)[0]) for other in flights.draws}
+    varied = columns_of(flights.study, {**first, **others, draw.name: np.array(ends)}, flights.cases)
+    physics = _physics(flights.scenario, {**varied, "seed": np.zeros(len(ends), int)}, len(ends))
     if physics is None:
         return False
     rows = rows_of(physics, len(ends))
@@ -111,7 +150,7 @@ def _matters(study: Study, scenario: Scenario, draw: Draw) -> bool:
 def _ends(draw: Draw, middle: bool) -> list[Any]:
     if draw.choice is not None:
         return [draw.choice[0]] if middle else list(draw.choice)
-    low, high = draw.uniform or (0.0, 0.0)
+    low, high = draw.ends or (0.0, 0.0)
     if draw.normal is not None:
         mean, deviation = draw.normal
         low, high = mean - DEVIATIONS * deviation, mean + DEVIATIONS * deviation

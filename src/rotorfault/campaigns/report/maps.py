@@ -25,7 +25,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.one_line import LONGEST, cut, record_line
 from rotorfault.campaigns.axes import AXES, ROTOR_AXES
 from rotorfault.campaigns.flight_set import Counts
-from rotorfault.campaigns.grades import GRADES
+from rotorfault.campaigns.grading import GRADINGS
 from rotorfault.campaigns.report.limits import Limits, limits
 from rotorfault.campaigns.rounds import next_round
 from rotorfault.campaigns.sampling.paired import (
@@ -38,6 +38,7 @@ from rotorfault.campaigns.sampling.paired import (
 from rotorfault.campaigns.sampling.refine import intervals, looks
 from rotorfault.campaigns.sampling.statistics import Array, Interval, holm, wilson
 from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.varied import GridAxis
 
 PROBABILITIES = (0.1, 0.5, 0.9)
 """Of the quantiles: least values within which at least this share of flights stays."""
@@ -164,7 +165,7 @@ def maps(study: Study, table: pa.Table) -> Maps:
     InputError
         If no cell has a whole round yet.
     """
-    views = tuple(_view(part.name, part.grid) for part in study.axis)
+    views = tuple(_view(part) for part in study.axis)
     names = ("variant", "cell", "number", "id", "success", "grade", "recovery_time", "altitude_lost")
     columns = {name: table[name].to_numpy(zero_copy_only=False) for name in names}
     cell = np.arange(study.cells).reshape(study.shape)[np.ix_(*(view.order for view in views))]
@@ -192,10 +193,13 @@ def maps(study: Study, table: pa.Table) -> Maps:
     )
 
 
-def _view(name: str, grid: list[float | str]) -> View:
+def _view(part: GridAxis) -> View:
+    name, grid = part.name, part.grid
     numeric = name not in ROTOR_AXES and all(isinstance(value, float) for value in grid)
     order = np.argsort(np.array(grid, dtype=float), kind="stable") if numeric else np.arange(len(grid))
-    return View(name, AXES[name].unit if name in AXES else "", [grid[i] for i in order], order, numeric)
+    return View(
+        name, AXES[name].unit if name in AXES and not part.case else "", [grid[i] for i in order], order, numeric
+    )
 
 
 def _sample(study: Study, columns: dict[str, NDArray[Any]], label: str, place_of: Counts) -> _Sample:
@@ -226,9 +230,10 @@ def _variant(study: Study, k: int, sample: _Sample, cell: Counts, common: NDArra
     bounds = intervals(successes, trials, study.refine)
     with np.errstate(invalid="ignore"):
         success_rate = np.where(trials > 0, successes / np.maximum(trials, 1), np.nan)
-    index_of = {name: i for i, name in enumerate(GRADES)}
+    names = GRADINGS[study.grading].names
+    index_of = {name: i for i, name in enumerate(names)}
     grade = np.array([index_of[name] for name in sample.columns["grade"]], dtype=np.int64)
-    by_grade = np.bincount(grade * count + place, minlength=len(GRADES) * count).reshape(len(GRADES), count)
+    by_grade = np.bincount(grade * count + place, minlength=len(names) * count).reshape(len(names), count)
     failure = np.full(count, -1)
     places, first = np.unique(place[~success], return_index=True)  # sorted by number within a cell
     failure[places] = sample.columns["id"][~success][first]
@@ -255,7 +260,7 @@ def _variant(study: Study, k: int, sample: _Sample, cell: Counts, common: NDArra
         first_failure=failure.reshape(shape),
         possible=None if possible is None else Limits(*(each.reshape(shape) for each in possible)),
         total=_total(study, sample, success, common),
-        shares=_shares(by_grade.reshape(len(GRADES), rows, -1)),
+        shares=_shares(by_grade.reshape(len(names), rows, -1)),
         recovery_along=quantiles[1],
         altitude_along=quantiles[3],
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
 from rotorfault.base.plain_text import argument
-from rotorfault.campaigns import grades
+from rotorfault.campaigns.grading import GRADINGS
 from rotorfault.campaigns.report import charts
 from rotorfault.campaigns.report.answer import answer
 from rotorfault.campaigns.report.axis_drawing import coarse
@@ -26,18 +26,6 @@ from rotorfault.loop.scores import RECOVERED
 from rotorfault.pages.style import environment, script_data
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
-MEANINGS = {
-    "held": f"flew to its end; over the last half within {grades.HELD:g} m (root mean square) and "
-    f"{grades.YAW:g} rad of yaw",
-    "yaw given up": f"the same in position (up to {grades.BOUNDED:g} m), but yaw was off by more",
-    "degraded": f"flew to its end with a bounded offset, {grades.HELD:g} m to {grades.BOUNDED:g} m",
-    "controlled descent": f"came down upright (within {np.degrees(grades.UPRIGHT):.0f} degrees) at no more than "
-    f"{grades.DESCENT:g} m/s, or landed",
-    "drifted": f"flew to its end, but more than {grades.BOUNDED:g} m off",
-    "crashed": f"hit the ground faster than {grades.DESCENT:g} m/s, or tilted by more than "
-    f"{np.degrees(grades.UPRIGHT):.0f} degrees",
-    "lost": "tumbled, upside down in the air for half a second, or diverged: a state not finite or 10 km away",
-}
 
 
 def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mapping[str, Path]) -> str:
@@ -66,7 +54,8 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         maps=maps,
         answer=answer(maps),
         flown=flown(maps, folder, versions),
-        meanings=MEANINGS,
+        meanings=GRADINGS[maps.study.grading].meanings,
+        about_grades=GRADINGS[maps.study.grading].about,
         recovered=f"{RECOVERED:g}",
         possible=[_possible(variant) for variant in maps.variants],
         coarse=any(coarse(view) for view in maps.views[:2]),
