@@ -26,6 +26,8 @@ from rotorfault.campaigns.store.folder import FLIGHTS, PAGE, STUDY
 from rotorfault.campaigns.store.identity import read_identity
 from rotorfault.campaigns.store.store import Store
 from rotorfault.campaigns.study import Study, sources_of, study_from
+from rotorfault.campaigns.summaries import summary_of
+from rotorfault.campaigns.summaries.parts import Summary
 from rotorfault.flight import doubts
 from rotorfault.flight.flight import Flight
 from rotorfault.scenario.library import with_whole_paths
@@ -104,13 +106,23 @@ class Campaign:
             return None
         return page if page.stat().st_mtime_ns >= table.stat().st_mtime_ns else None
 
+    def summary(self) -> Summary | None:
+        """What its study writes besides table and maps, from the flights there are; None where it writes nothing."""
+        return summary_of(self.study, self._store.table())
+
     def report(self) -> list[Path]:
-        """Write pictures and page; the page's path first."""
+        """Write pictures and page, and what its study writes besides; the page's path first."""
         # Loads Matplotlib and Plotly, which a campaign does not need.
         from rotorfault.campaigns.report.report import write
 
         made_by = {**self._store.identity.versions, "source": self._store.identity.program}
+        self.write_summary()
         return write(self.study, self._store.table(), self.folder, made_by)
+
+    def write_summary(self) -> list[Path]:
+        """Write the files of the study's summary anew, if it has one; their paths."""
+        summary = self.summary()
+        return [] if summary is None else summary.write(self.folder)
 
     def keep_flights(self, cells: int) -> list[Path]:
         """Keep pages of flights in the folder, in the cells whose success is nearest to one half; their paths.
@@ -318,7 +330,10 @@ def campaign(
         say(f"{progress.flights:,} flights in {progress.rounds} rounds, {progress.seconds:.0f} s; table in {table}")
     else:
         say(f"{checked.name} is complete, nothing is left to fly: {progress.total:,} flights in {table}")
-    return Campaign(folder, allow_code=checked.allows_code)
+    done = Campaign(folder, allow_code=checked.allows_code)
+    for path in done.write_summary():
+        say(f"summary in {path}")
+    return done
 
 
 def _study_at(place: str | Path, allow_code: bool) -> Study:

@@ -98,7 +98,7 @@ def campaign(
         there = Campaign(out, allow_code=allow_code or controllers or False)
         _keep(there, keep_flights)
         _report(there)
-        say(str(there.answer()))
+        _say_answer(there)
         return
     if study is None:
         raise InputError(
@@ -118,7 +118,7 @@ def campaign(
     _keep(done, keep_flights)
     if report:
         _report(done, None if keep_flights else done.page)
-    say(str(done.answer()))
+    _say_answer(done)
 
 
 @app.command()
@@ -199,6 +199,12 @@ def _keep(campaign: Campaign, cells: int | None) -> None:
     places = f"in each of the {cells} cells" if cells > 1 else "in the cell"
     each = f"one for each variant {places} nearest to 50 % success, where it was flown"
     say(f"{len(pages)} flight pages in {campaign.folder / 'flights'}: {each}")
+
+
+def _say_answer(campaign: Campaign) -> None:
+    """What was found; of a study with a summary, that."""
+    summary = campaign.summary()
+    say(str(campaign.answer()) if summary is None else "\n".join(summary.lines))
 
 
 def _report(campaign: Campaign, page: Path | None = None) -> None:

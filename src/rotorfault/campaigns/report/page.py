@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,21 @@ from rotorfault.campaigns.report.curves import slices
 from rotorfault.campaigns.report.flown import flown
 from rotorfault.campaigns.report.maps import Maps, VariantMap
 from rotorfault.campaigns.sampling.statistics import Array
+from rotorfault.campaigns.summaries.parts import Summary
 from rotorfault.loop.scores import RECOVERED
 from rotorfault.pages.style import environment, script_data
 
 MOST_ROWS = 3000  # of the table of all cells; beyond, it would slow the page down
 
 
-def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mapping[str, Path]) -> str:
+def render(
+    maps: Maps,
+    folder: Path,
+    versions: Mapping[str, str],
+    figures: Mapping[str, Path],
+    summary: Summary | None = None,
+    own: Sequence[Path] = (),
+) -> str:
     """The page's HTML.
 
     Parameters
@@ -40,6 +48,10 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         With which the campaign was flown.
     figures : mapping of str to Path
         SVG files to be shown: ``grades`` and ``recovery``.
+    summary : Summary, optional
+        What the study writes besides.
+    own : sequence of Path
+        SVG files of its figures.
     """
     template = (resources.files("rotorfault.campaigns.report") / "campaign.html.j2").read_text(encoding="utf-8")
     cells = [charts.variant_cells(maps, k, folder) for k in range(len(maps.variants))]
@@ -68,6 +80,8 @@ def render(maps: Maps, folder: Path, versions: Mapping[str, str], figures: Mappi
         cut=len(rows) - MOST_ROWS if len(rows) > MOST_ROWS else 0,
         folder=argument(folder),
         figures={name: base64.b64encode(path.read_bytes()).decode("ascii") for name, path in figures.items()},
+        summary=summary,
+        summary_figures=[(path.stem, base64.b64encode(path.read_bytes()).decode("ascii")) for path in own],
         plotly=Markup(get_plotlyjs()),
     )  # fmt: skip
 

@@ -11,8 +11,10 @@ from rotorfault.base.files import write_atomically
 from rotorfault.campaigns.report.figures import draw
 from rotorfault.campaigns.report.maps import maps
 from rotorfault.campaigns.report.page import render
+from rotorfault.campaigns.report.summary_figures import summary_figures
 from rotorfault.campaigns.store.folder import PAGE
 from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.summaries import summary_of
 from rotorfault.report.figures import save
 
 FIGURES = "figures"
@@ -41,9 +43,11 @@ def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, st
     InputError
         If no cell has a whole round yet, or the folder cannot be written.
     """
-    numbers = maps(study, table)
-    figures = save(draw(numbers), folder / FIGURES, ("png", "svg"))
+    numbers, summary = maps(study, table), summary_of(study, table)
+    drawn = {} if summary is None else summary_figures(summary)
+    figures = save({**draw(numbers), **drawn}, folder / FIGURES, ("png", "svg"))
     shown = {path.stem: path for path in figures if path.suffix == ".svg" and path.stem in ("grades", "recovery")}
-    text, page = render(numbers, folder, versions, shown), folder / PAGE
+    own = [path for path in figures if path.suffix == ".svg" and path.stem in drawn]
+    text, page = render(numbers, folder, versions, shown, summary, own), folder / PAGE
     write_atomically(page, lambda temporary: temporary.write_text(text, encoding="utf-8"))
     return [page, *figures]
