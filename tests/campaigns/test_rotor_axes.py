@@ -9,7 +9,8 @@ import pytest
 
 from rotorfault.base.errors import InputError
 from rotorfault.campaigns.changes import changed
-from rotorfault.campaigns.study import MOST_CELLS, Study, load_study, study_from
+from rotorfault.campaigns.load import load_study
+from rotorfault.campaigns.study import MOST_CELLS, Study, study_from
 
 
 def study(vehicle: str = "x8", axes: list[dict[str, Any]] | None = None, **own: Any) -> Study:
