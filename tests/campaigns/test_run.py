@@ -245,7 +245,7 @@ def test_identifiers_name_flights() -> None:
         ({"axis": [{"name": "loss", "values": [0.1, 0.1]}]}, "has values twice"),
         ({"draw": [{"name": "loss", "uniform": [0.0, 1.0]}]}, "is varied twice"),
         ({"draw": [{"name": "mass", "uniform": [1.0, 1.0]}]}, "an empty range"),
-        ({"draw": [{"name": "mass"}]}, "give one of uniform, normal and choice"),
+        ({"draw": [{"name": "mass"}]}, "give one of uniform, normal, choice and sine"),
         ({"variant": []}, "variant"),
         ({"variant": [{"label": "a"}, {"label": "a"}]}, "two variants are called 'a'"),
         ({"axis": [{"name": "loss", "start": 0.0, "stop": 1.0, "count": 9999},

@@ -51,7 +51,7 @@ LAZY = {
     "rotorfault.campaigns.flight_table": {"polars": "takes longer to load than a table to make"},
     "rotorfault.cli.catalogue": {
         "rotorfault.campaigns.run": "is needed to check a study, and for no list",
-        "rotorfault.campaigns.study": "the same",
+        "rotorfault.campaigns.load": "the same",
         "rotorfault.flight.reference_rows": "the same",
         "rotorfault.flight.assembly": "is needed to check a scenario, and for no list",
         "rotorfault.analysis.reach": "is needed to check a vehicle, and brings scipy",
@@ -59,7 +59,7 @@ LAZY = {
     },
     "rotorfault.cli.details": {
         "rotorfault.campaigns.axes": "is needed for studies and what they vary alone",
-        "rotorfault.campaigns.study": "the same, and its statistics take long to load",
+        "rotorfault.campaigns.load": "the same, and its statistics take long to load",
     },
     "rotorfault.bench.rotorpy_plant": {
         "rotorpy.vehicles.hummingbird_params": OPTIONAL,

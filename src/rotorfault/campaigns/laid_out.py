@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import InputError, as_text
@@ -11,36 +11,37 @@ from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.library import with_whole_paths
 from rotorfault.scenario.preset_file import is_preset_file
 
-if TYPE_CHECKING:
-    from rotorfault.campaigns.study import Study
-
 Tables = dict[str, Any]
 
 
-def laid_out(study: Study) -> Tables:
+def laid_out(tables: Tables, scenario: Callable[[], Tables], controller: Callable[[int], Tables]) -> Tables:
     """Tables of a study that depend on no file.
 
     Parameters
     ----------
-    study : Study
+    tables : dict
+        Of the study, which are changed.
+    scenario : callable
+        Gives the tables of the scenario that it names.
+    controller : callable
+        Gives the table of the controller of a variant by its place.
 
     Raises
     ------
     InputError
         If a file cannot be read.
     """
-    tables = study.as_tables()
-    if isinstance(study.scenario, str):
+    if isinstance(tables["scenario"], str):
         try:
-            tables["scenario"] = study.scenario_tables()
+            tables["scenario"] = scenario()
         except InputError as error:
-            raise InputError(f"study '{study.name}': {error}") from None
+            raise InputError(f"study '{tables['name']}': {error}") from None
     tables["scenario"] = with_whole_paths(tables["scenario"])
     tables |= {key: with_whole_paths(tables[key]) for key in ("settings", "overrides", "variant", "axis")}
     for settings in each_settings(tables):
         if as_text(settings.get("vehicle", "")).endswith(".toml"):
             settings["vehicle"] = load_vehicle(settings["vehicle"]).model_dump(mode="json")
-    _lay_out_presets(study, tables)
+    _lay_out_presets(tables, controller)
     return tables
 
 
@@ -69,15 +70,14 @@ def of_controller(key: str) -> bool:
     return key.partition(".")[0] == CONTROLLER.name
 
 
-def _lay_out_presets(study: Study, tables: Tables) -> None:
+def _lay_out_presets(tables: Tables, controller: Callable[[int], Tables]) -> None:
     """Put the settings of presets from files in place of the files, in the tables of the study."""
     common = (tables["settings"], tables["overrides"])
     everywhere = any(_names_preset_file(settings) for settings in (tables["scenario"], *common))
     for number, variant in enumerate(tables["variant"]):
         if everywhere or _names_preset_file(variant["settings"]):
-            part = study.scenario_of(number)[CONTROLLER]
             rest = {key: value for key, value in variant["settings"].items() if not of_controller(key)}
-            variant["settings"] = {**rest, CONTROLLER.name: part.as_table()}
+            variant["settings"] = {**rest, CONTROLLER.name: controller(number)}
     if everywhere:
         for settings in common:
             for key in [key for key in settings if of_controller(key)]:

@@ -176,7 +176,12 @@ class Study(Strict):
         InputError
             If a file cannot be read.
         """
-        return study_from(laid_out(self), self.name, self._allow_code)
+
+        def controller(number: int) -> dict[str, Any]:
+            return self.scenario_of(number)[CONTROLLER].as_table()
+
+        tables = laid_out(self.as_tables(), self.scenario_tables, controller)
+        return study_from(tables, self.name, self._allow_code)
 
     @property
     def own_sources(self) -> dict[str, str]:
