@@ -275,7 +275,7 @@ def _thrusts_for(vehicle: Vehicle, able: PerRotor, wrench: Wrench) -> PerRotor:
     return thrust
 
 
-def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench) -> Wrench:
+def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench, fades: Scalar) -> Wrench:
     """The wrench that comes of a thrust and tilt torque when each rotor is put within its limits.
 
     An allocation that serves tilt before thrust would stop all rotors for a torque that they can only work against.
@@ -288,13 +288,31 @@ def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench) -> Wrench:
         Of its rotors.
     wrench : Wrench
         Wanted; its yaw torque is not looked at.
+    fades : scalar
+        0 to 1: how little thrust beyond the wanted one is worth.
     """
     effect = effect_of(vehicle, believed.loss, believed.stuck)
     low, high = effect * vehicle.thrust_min, effect * vehicle.thrust_max
     held = believed.stuck.thrust
     moving = wrench_of(vehicle, held)
     left = Wrench(wrench.thrust - moving.thrust, wrench.torque_B - moving.torque_B)
-    return wrench_of(vehicle, _thrusts_for(vehicle, high, left).map(clip, low, high) + held)
+    thrust = _thrusts_for(vehicle, high, left)
+    # Cut one by one, a rotor that would have to pull down leaves the others with more than the wanted thrust, up to
+    # their limit, where they tilt nothing. Upright that carries, and spins the body up, which is what it lacks; where
+    # it does not carry they share anew what is left, so far as one of them is beyond its limit.
+    rests = thrust.map(lambda f, least: select(greater(f, least), 0.0, 1.0), low)
+    resting = rests * low
+    rest = wrench_of(vehicle, resting)
+    left = Wrench(left.thrust - rest.thrust, left.torque_B - rest.torque_B)
+    moves = high.map(lambda f, off: f * (1.0 - off), rests)
+    again = _thrusts_for(vehicle, moves, left) + resting
+    # One rotor alone has nothing to share.
+    weight = vehicle.mass * vehicle.gravity
+    several = greater(moves.map(lambda f: greater(f, 1e-3 * weight)).sum(), 1.5)
+    beyond = (thrust - high).map(lambda over, fewer: over / maximum(fewer, 1e-6 * weight), thrust - again)
+    share = clip(beyond.reduce(maximum), 0.0, 1.0) * several * fades
+    chosen: PerRotor = thrust + (again - thrust) * share
+    return wrench_of(vehicle, chosen.map(clip, low, high) + held)
 
 
 def lean_in_balance(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar | Vec3) -> Vec3:

@@ -23,6 +23,9 @@ from rotorfault.model.signals import Wrench
 
 # Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
 LEAST_THRUST = 0.3
+# Cosine of the tilt from which on thrust fades, as far as yaw is given up: where the upright law lets it rise no
+# further (`cos_min`). Upside down it only adds to the fall.
+SIDEWAYS = 0.3
 # Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
 # rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
 FASTEST = 10.0
@@ -69,7 +72,9 @@ class Spinning:
         inputs = self.inputs
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
         most = minimum(self.axis.thrust, HOVER_RESERVE * weight / share)
-        return maximum(inputs.thrust_available, most * self.axis.given_up)
+        # Where yaw is not even braked there is nothing to spare thrust for: all that balances stops a fall.
+        given_up = maximum(most * self.axis.given_up, self.axis.thrust * self.axis.free)
+        return maximum(inputs.thrust_available, given_up)
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
@@ -111,7 +116,8 @@ class Spinning:
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
-        relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B)).torque_B
+        lifts = clip(self.cosine / SIDEWAYS, 0.0, 1.0)
+        relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
         beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(inputs.vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         # About yaw what is attainable beside a rotor stuck high is its own: asked for that, it could never show that
@@ -119,4 +125,5 @@ class Spinning:
         free = minimum(self.axis.free, given_up)
         tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
         yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
-        return after, Wrench(upright.thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
+        thrust = upright.thrust * (1.0 - free + lifts * free)
+        return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
