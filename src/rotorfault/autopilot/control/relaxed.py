@@ -275,7 +275,7 @@ def _thrusts_for(vehicle: Vehicle, able: PerRotor, wrench: Wrench) -> PerRotor:
     return thrust
 
 
-def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench, fades: Scalar) -> Wrench:
+def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench, fades: Scalar = 0.0) -> Wrench:
     """The wrench that comes of a thrust and tilt torque when each rotor is put within its limits.
 
     An allocation that serves tilt before thrust would stop all rotors for a torque that they can only work against.
@@ -288,7 +288,7 @@ def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench, fades: Sca
         Of its rotors.
     wrench : Wrench
         Wanted; its yaw torque is not looked at.
-    fades : scalar
+    fades : scalar, optional
         0 to 1: how little thrust beyond the wanted one is worth.
     """
     effect = effect_of(vehicle, believed.loss, believed.stuck)
