@@ -247,6 +247,7 @@ def campaign(
     seed: int | None = None,
     budget: int | None = None,
     quick: bool = False,
+    flights: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     allow_code: bool = False,
@@ -269,7 +270,7 @@ def campaign(
         Names or places in code (``FILE.py:NAME``), compared in place of the study's controllers: each is a variant.
     settings : mapping, optional
         Dotted keys and values for all flights, over all that the study says.
-    vehicle, preset, seed, budget, quick : optional
+    vehicle, preset, seed, budget, quick, flights : optional
         In place of the study's; see `rotorfault.campaigns.changes.changed`.
     workers : int, optional
         Threads; one per core if not given. Nothing in the table depends on it.
@@ -310,6 +311,7 @@ def campaign(
         seed=seed,
         budget=budget,
         quick=quick,
+        flights=flights,
     ).resolved()
     require("" if out is None else out, (str, Path), "out", "the path of a folder")
     folder = Path("campaigns") / file_name(checked.name) if out is None else Path(out)

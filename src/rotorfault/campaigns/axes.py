@@ -60,7 +60,7 @@ def _times(values: Mapping[str, NDArray[Any]], column: Any, *keys: str) -> Colum
     """Times of the first fault; or of one for each rotor, which never comes where nothing is lost."""
     count = struck_of(values)
     if count:
-        column = np.where(np.asarray(values.get("loss", 1.0), dtype=float) > 0.0, column, BEYOND)
+        column = np.where(np.asarray(values.get("loss", 1.0), dtype=float) > 0.0, column, BEYOND + column)
     return {f"fault.{number}.{key}": column for number in range(count or 1) for key in keys}
 
 

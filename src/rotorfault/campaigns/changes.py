@@ -42,6 +42,7 @@ def changed(
     seed: int | None = None,
     budget: int | None = None,
     quick: bool = False,
+    flights: int | None = None,
 ) -> Study:
     """The same study with something else in it.
 
@@ -63,6 +64,8 @@ def changed(
         Flights of all variants in all cells, at most.
     quick : bool
         Few flights in each cell and one round, of those values of axes that the study's ``[quick]`` keeps.
+    flights : int, optional
+        Of each variant in each cell, in one round.
 
     Raises
     ------
@@ -91,15 +94,17 @@ def changed(
         tables["seed"] = seed
     if quick:
         _shorten(study, tables)
+    if quick or flights is not None:
+        count = study.quick.flights if flights is None else flights
+        level = study.refine.level
+        tables["refine"] = {"initial": count, "block": count, "most": count, "level": level}
     if budget is not None:
         tables["refine"]["budget"] = budget
     return study_from(tables, study.name, allowed_with(study.allows_code, {KIND: named, **given}))
 
 
 def _shorten(study: Study, tables: dict[str, Any]) -> None:
-    """Leave few flights in each cell, and the values of axes that a short run keeps."""
-    flights = study.quick.flights
-    tables["refine"] = {"initial": flights, "block": flights, "most": flights, "level": study.refine.level}
+    """Leave the values of axes that a short run keeps."""
     for part, table in zip(study.axis, tables["axis"], strict=True):
         kept = study.quick.keep.get(part.name)
         if kept and part.case:

@@ -58,6 +58,9 @@ def campaign(
     quick: Annotated[
         bool, typer.Option("--quick", help="Few flights and cells, in a minute or so, to see what the study is like.")
     ] = False,
+    flights: Annotated[
+        int | None, typer.Option(min=1, help="Flights of each variant in each cell, in one round, and no more.")
+    ] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Make report.html and figures/.")] = True,
     report_only: Annotated[
         bool, typer.Option("--report-only", help="Fly nothing: make the report of what is in the folder, --out.")
@@ -107,7 +110,7 @@ def campaign(
     try:
         done = fly_campaign(
             study, out, resume=resume, repair=repair, controllers=controllers or (), settings=settings,
-            vehicle=vehicle, preset=presets, seed=seed, budget=budget, quick=quick, workers=workers,
+            vehicle=vehicle, preset=presets, seed=seed, budget=budget, quick=quick, flights=flights, workers=workers,
             scheduler=scheduler,
             say=lambda line: say(line, err=True), allow_code=allow_code,
         )  # fmt: skip
