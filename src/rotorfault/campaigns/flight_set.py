@@ -103,14 +103,17 @@ def draws(study: Study, flights: FlightSet) -> dict[str, NDArray[Any]]:
     found = {draw.name: _value(draw, share) for draw, share in zip(study.draw, shares.T, strict=False)}
     if len(every) == len(study.draw):
         return found
+    # Every block has the same columns, whatever its cells draw.
+    for number, draw in enumerate(every[len(study.draw) :], start=len(study.draw)):
+        value = _value(draw, shares[:, number])
+        blank = np.full(flights.size, np.nan) if value.dtype.kind == "f" else np.full(flights.size, "", value.dtype)
+        found.setdefault(draw.name, blank)
     for which, _, cases in alike(study, flights):
         for name, (number, draw) in study.draws_of(cases).items():
             if number >= len(study.draw):
                 value = _value(draw, shares[which, number])
-                blank = np.full(flights.size, np.nan if value.dtype.kind == "f" else "", dtype=value.dtype)
-                column = found.setdefault(name, blank)
-                found[name] = column = column.astype(np.promote_types(column.dtype, value.dtype))
-                column[which] = value
+                found[name] = found[name].astype(np.promote_types(found[name].dtype, value.dtype))
+                found[name][which] = value
     return found
 
 

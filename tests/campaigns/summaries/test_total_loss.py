@@ -96,7 +96,7 @@ def test_what_is_drawn_in_a_case_is_drawn_there_alone(flown: Path) -> None:
 def test_a_stopped_campaign_gives_the_same_files(
     flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rotorfault.campaigns.rounds.FLIGHTS_IN_BLOCK", 20)
+    monkeypatch.setattr("rotorfault.campaigns.rounds.FLIGHTS_IN_BLOCK", 6)
     whole, blocks = run.fly_block, []
 
     def stop_after_two(*given: Any, **named: Any) -> Any:
