@@ -148,6 +148,26 @@ def simulated_healthy(count: int) -> Iterator[Log]:
         yield log_of(rf.fly("hover-fault", settings=settings, seed=seed).records(), f"{vehicle} {seed}")
 
 
+def losses(count: int) -> None:
+    """Flights of rotorfault in gusts of 6 m/s in which a rotor loses thrust after 20 s: how often it is named."""
+    print("\nrotorfault's own flights in gusts (6 m/s), a rotor loses thrust at 20 s")
+    for loss in (0.15, 0.2, 0.3, 0.5):
+        right, wrong, delays = 0, 0, []
+        for seed in range(count):
+            vehicle, preset = (("x500", "midsize"), ("hummingbird", "tuned"))[seed % 2]
+            rotor = seed % 4 + 1
+            settings = {"vehicle": vehicle, "controller.preset": preset, "duration": 40.0, "record_period": 0.01,
+                        "fault": [{"kind": "step", "rotor": rotor, "time": 20.0, "loss": loss}],
+                        "wind.kind": "dryden", "wind.wind_at_6m": 6.0, "sensors.kind": "noisy"}  # fmt: skip
+            found = diagnosis_of(log_of(rf.fly("hover-fault", settings=settings, seed=seed).records(), vehicle))
+            right += found.rotor == rotor
+            wrong += found.rotor not in (None, rotor)
+            if found.rotor == rotor and found.alarm is not None:
+                delays.append(found.alarm - 20.0)
+        middle = f", median delay {np.median(delays):.2f} s" if delays else ""
+        print(f"loss of {loss:.0%}: right rotor named in {right} of {count}, a wrong one in {wrong}{middle}")
+
+
 def alarms(title: str, logs: Iterator[Log]) -> None:
     """Alarms of the test of sudden losses per hour, with the exact interval of a Poisson count."""
     hours, count, blamed, number = 0.0, 0, 0, 0
@@ -215,6 +235,7 @@ def main() -> int:
         )
         alarms("others' flights with body rates", real_healthy(data, scratch))
         alarms("rotorfault's own healthy flights", simulated_healthy(chosen.simulated))
+        losses(max(chosen.simulated // 5, 2))
         peers(data, scratch, chosen.flightdx)
         print("\nPredictions on NanoBench: root mean square of errors")
         file = rf.load_vehicle("crazyflie-2.1")

@@ -29,7 +29,9 @@ TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis b
 REFERENCE, GUARD = 20.0, 1.0  # s whose mean a residual is weighed against, and s between them
 FIRST = 3.0  # s at least before anything is said
 SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
+LASTING, PASSING = 0.05, 8  # loss below which what was found has passed, and how often that is looked for
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
+SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)  # s of sums by which the noise is measured
 HOLD = 5.0  # s over which evidence is gathered
 
 
@@ -48,6 +50,7 @@ class Scan(NamedTuple):
     alarm: float | None  # s, when the sum passed the threshold
     scores: Array  # (N,) of each rotor where the evidence is strongest, averaged over losses
     free: float  # the same of a push in any direction
+    settled: float | None  # loss by what commands settle at, where the flight goes on calmly
 
 
 def threshold_of(block: float) -> float:
@@ -83,15 +86,26 @@ def referenced(values: Array, block: float) -> Array:
 
 
 def scan(residual: Residual) -> Scan:
-    """Test a flight.
+    """Test a flight; what does not last is no loss, and is left out.
 
     Parameters
     ----------
     residual : Residual
     """
     rho = referenced(residual.values, residual.block)
+    noise = _noise(rho, residual.block)
+    for _ in range(PASSING):
+        found, begin = _scanned(residual, rho, noise)
+        if found.alarm is None or found.settled is None or found.settled > LASTING:
+            break
+        rho[begin : begin + int(HOLD / residual.block)] = np.nan
+    return found
+
+
+def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tuple[Scan, int]:
+    """One run of the test, and the block at which what it found begins."""
     count, motors = len(rho), residual.command.shape[1]
-    memory, spread = _noise(rho)
+    memory, spread = noise
     threshold = threshold_of(residual.block)
     shapes = -LOSSES[:, None, None] * residual.patterns.T[None]  # losses, rotors, axes
     sums = np.full((len(LOSSES), motors), -np.inf)
@@ -124,22 +138,25 @@ def scan(residual: Residual) -> Scan:
         if (alarm is None or near) and evidence[k].max() > strongest:
             strongest, best = float(evidence[k].max()), (k, sums.copy(), onsets.copy())
     time = residual.time + residual.block
-    said = Scan(time, evidence, rho, spread, memory, threshold, None, None, 0.0, None, np.zeros(motors), 0.0)
+    said = Scan(time, evidence, rho, spread, memory, threshold, None, None, 0.0, None, np.zeros(motors), 0.0, None)
     if best is None:
-        return said
+        return said, 0
     k, sums, onsets = best
     loss, rotor = np.unravel_index(int(np.argmax(sums)), sums.shape)
     begin = int(onsets[loss, rotor])
     free = _free_shift(rho[begin : k + 1], residual.doubt[begin : k + 1], memory, spread, residual.response.hover)
     average = np.log(np.mean(np.exp(np.minimum(sums, 700.0)), axis=0) + 1e-300)
-    return said._replace(
+    settled = _settled_loss(residual, rho, begin, int(rotor))
+    found = said._replace(
         onset=float(residual.time[begin]),
         rotor=int(rotor),
-        loss=_settled_loss(residual, rho, begin, int(rotor)) or _mean_loss(sums[:, rotor]),
+        loss=_mean_loss(sums[:, rotor]) if settled is None else settled,
         alarm=None if alarm is None else float(time[alarm]),
         scores=average,
         free=free,
+        settled=settled,
     )
+    return found, begin
 
 
 def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> float | None:
@@ -196,7 +213,20 @@ def _ratio(noise: Array, signal: Array) -> Array:
     return ratio
 
 
-def _noise(rho: Array) -> tuple[Array, Array]:
+def _longer(new: Array, block: float) -> float:
+    """By how much sums of what is new spread more than those of independent numbers: gusts and turns last."""
+    one = float(np.median(np.abs(new)))
+    worst = 1.0
+    for seconds in SCALES:
+        width = max(int(seconds / block), 2)
+        count = len(new) // width
+        if count >= 10 and one > 0.0:
+            sums = new[: count * width].reshape(count, width).sum(axis=1)
+            worst = max(worst, float(np.median(np.abs(sums))) / (one * math.sqrt(width)))
+    return worst
+
+
+def _noise(rho: Array, block: float) -> tuple[Array, Array]:
     """How much of each residual remains a block later, and the spread of what is new."""
     memory, spread = np.zeros(4), np.full(4, 1.0)
     for axis in range(4):
@@ -208,5 +238,5 @@ def _noise(rho: Array) -> tuple[Array, Array]:
         x = np.clip(x, -limit, limit)
         memory[axis] = min(max(float((x[1:] * x[:-1]).sum() / max((x**2).sum(), 1e-18)), 0.0), 0.95)
         new = x[1:] - memory[axis] * x[:-1]
-        spread[axis] = max(1.4826 * float(np.median(np.abs(new))), 2e-3)
+        spread[axis] = max(1.4826 * float(np.median(np.abs(new))) * _longer(new, block), 2e-3)
     return memory, spread
