@@ -4,9 +4,9 @@
 
 Hover in gusts of 5 m/s without a fault, by a Hummingbird; noise, biases and gusts anew in each flight. At each
 recorded instant: the mean over all flights of the normalised innovations squared over how many there were, and of the
-squared errors over their believed variance, for each state. Both are chi-square numbers: with n of them the mean is 1,
-and 95 % of means lie within the band that is printed. A mean above it says that the filter is too sure, below that it is
-too careful.
+squared errors over their believed variance, for each state. Both are chi-square numbers: with n of them the mean is
+1, and 95 % of means lie within the band that is printed. A mean above it says that the filter is too sure, below that
+it is too careful.
 """
 
 from __future__ import annotations
