@@ -169,6 +169,20 @@ def test_what_a_part_records_of_its_own_has_a_panel(faulty: rf.Flight, slot: str
     assert f"{slot}.covariance" not in found
 
 
+def test_a_statistic_stands_with_what_it_is_compared_with(faulty: rf.Flight) -> None:
+    records = faulty.records()
+    count = len(records["time"].values)
+    statistic = Variable(("time", "rotor"), np.arange(4.0 * count).reshape(-1, 4), {"units": "1"})
+    for unit, roles in {"1": ["more"] * 4 + ["threshold"], "N": ["more"] * 4}.items():
+        own = {
+            "diagnosis.statistic": statistic,
+            "diagnosis.level": Variable(("time",), np.full(count, 7.0), {"units": unit}),
+        }
+        data = derived(FlightData({**records.variables, **own}, records.coordinates, records.attrs), None)
+        (panel,) = [panel for panel in panels(data, {}) if panel.name == "diagnosis.statistic"]
+        assert [curve.role for curve in panel.curves] == roles
+
+
 def test_panels_leave_out_estimates_that_are_the_truth(faulty: rf.Flight) -> None:
     records = faulty.records()
     noisy, exact = (

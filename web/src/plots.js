@@ -141,7 +141,8 @@ export class Plots {
     const head = element('div', 'head');
     const unit = unitText(panel.unit);
     head.append(element('b', '', panel.title + (unit ? ` (${unit})` : '')));
-    if (panel.about) root.title = panel.about;
+    const about = panel.about ?? this.flights.map((flight) => flight.signals[panel.name]?.about).find(Boolean);
+    if (about) root.title = about;
     const values = element('span', 'values');
     head.append(values);
     const body = element('div', 'body');

@@ -177,7 +177,8 @@ def _diagnosis(data: FlightData) -> Iterator[Panel]:
         curves = [missing if "thrust_missing" in data else Curve("thrust_residual", k, "residual", TRUE)]
         if _unit(data, "diagnosis.threshold") == unit:
             curves.append(Curve("diagnosis.threshold", k, "threshold", THRESHOLD))
-        title = f"rotor {number}: statistic and threshold"
+        compared = any(curve.role == THRESHOLD for curve in curves)
+        title = f"rotor {number}: " + ("statistic and threshold" if compared else curves[0].label)
         yield Panel(f"statistic.{number}", "Diagnosis", title, unit, _curves(data, *curves), _flag(data, k))
         evidence = (
             Curve("loss_true", k, "true loss", ASKED),
@@ -201,7 +202,17 @@ def _own(data: FlightData, shown: Collection[str]) -> Iterator[Panel]:
         if len(labels) <= WIDEST and not (values == values[0]).all():  # what never changes is a number, and no plot
             whose = f"{dims[0]} " if dims and labels[0].isdigit() else ""
             curves = tuple(Curve(name, k, f"{whose}{label}", MORE) for k, label in enumerate(labels))
+            curves += tuple(_thresholds(data, name))
             yield Panel(name, OWN[slot], title.replace("_", " "), _unit(data, name), curves)
+
+
+def _thresholds(data: FlightData, name: str) -> Iterator[Curve]:
+    """What a statistic is compared with, where the same part records it as a number in the same unit."""
+    slot, _, signal = name.rpartition(".")
+    for what in ("threshold", "level") if signal == "statistic" else ():
+        limit = f"{slot}.{what}"
+        if limit in data and data[limit].dims == ("time",) and _unit(data, limit) == _unit(data, name):
+            yield Curve(limit, 0, what, THRESHOLD)
 
 
 def _labels(data: FlightData, dim: str, count: int) -> list[str]:
