@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from rotorfault.autopilot.instant import Decision
     from rotorfault.autopilot.response.protocol import Response, ResponseInputs
     from rotorfault.base.config import Strict as Settings
-    from rotorfault.base.errors import ControllerWarning, FaultWarning, InputError, ReferenceWarning, VehicleWarning
+    from rotorfault.base.errors import (
+        ControllerWarning,
+        FaultWarning,
+        InputError,
+        ReferenceWarning,
+        VehicleWarning,
+        WindWarning,
+    )
     from rotorfault.campaigns.api import Campaign, campaign
     from rotorfault.flight.check_block import BlockReport, check_block
     from rotorfault.flight.comparison import Comparison, compare
@@ -144,6 +151,7 @@ _HOME = {
     "RelaxedHover": "analysis.relaxed_hover",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
+    "WindWarning": "base.errors",
     "Wrench": "model.signals",
     "acai": "analysis.controllability",
     "campaign": "campaigns.api",
@@ -244,6 +252,7 @@ __all__ = [
     "Vehicle",
     "VehicleWarning",
     "Wind",
+    "WindWarning",
     "Wrench",
     "__version__",
     "acai",

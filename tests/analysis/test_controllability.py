@@ -268,3 +268,9 @@ def test_a_vehicle_is_taken_with_its_own_numbers() -> None:
 def test_refusals_say_what_is_allowed(call, message: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(rf.InputError, match=message):
         call()
+
+
+def test_a_motor_that_is_named_twice_is_refused() -> None:
+    for ask in (rf.acai, rf.null_space):
+        with pytest.raises(rf.InputError, match=r"failed: got \[1, 1\]; allowed: each motor once"):
+            ask("hexa-x", failed=[1, 1])

@@ -93,3 +93,13 @@ def test_a_file_that_is_none_of_them_says_so(tmp_path: Path) -> None:
 def test_the_name_of_a_study_is_that_of_a_folder(name: str, tmp_path: Path) -> None:
     assert_refused(run("new", "study", "--", name, cwd=tmp_path), "name")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("hummingbird", "vehicle"), ("hover-fault", "scenario"), ("partial-loss-map", "study")]
+)
+def test_what_is_built_in_is_checked_by_its_name(name: str, words: str) -> None:
+    from rotorfault.cli import catalogue
+
+    line, _ = catalogue.check(Path(name))
+    assert line.startswith(f"{name}: {words} '{name}'")

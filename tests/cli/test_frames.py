@@ -136,6 +136,7 @@ def test_cases_are_written_as_json(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["hummingbird"], "its rotors are those of quad-plus; 'rotorfault trim hummingbird' says what it can lose"),
         (["hexa-y"], "did you mean 'hexa-x'"),
         (
             ["quad-x", "--failed", "5"],

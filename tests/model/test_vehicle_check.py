@@ -35,7 +35,7 @@ def test_vehicles_that_are_included_are_not_doubted(vehicle: Vehicle) -> None:
 
 
 def scaled(vehicle: Vehicle, size: float, density: float) -> Vehicle:
-    """A vehicle alike in all proportions; blades turn with the same speed at the tips."""
+    """A vehicle alike in all proportions; blades turn with the same speed at the tips; without a pack."""
     mass = density * size**3
     b = size**4
     return vehicle._replace(
@@ -48,6 +48,7 @@ def scaled(vehicle: Vehicle, size: float, density: float) -> Vehicle:
         torque_ratio=vehicle.torque_ratio * size,
         thrust_max=vehicle.thrust_max * mass,
         linear_drag=vehicle.linear_drag * mass,
+        battery=(),
     )
 
 

@@ -14,6 +14,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.engine.taylor import fly_taylor
 from rotorfault.flight.assembly import assemble
 from rotorfault.maths.geometry import PerRotor
+from rotorfault.plant import FAULT
 from rotorfault.scenario.library import load_scenario
 from rotorfault.scenario.overrides import override_all
 from rotorfault.scenario.scenario import Scenario, scenario_from
@@ -127,3 +128,16 @@ def test_the_closed_loop_is_that_of_taylor_series_too() -> None:
 def test_engines_agree_on_what_is_odd(engine: str) -> None:
     flight = odd_flight()
     assert_same(run(flight, engine).signals, run(flight, "python").signals)
+
+
+def test_one_of_three_axes_is_set_by_its_number() -> None:
+    made = load_scenario("hover-fault", {"mismatch.centre_of_mass.0": 0.01, "mismatch.inertia.1": 1.1})
+    assert made.mismatch.centre_of_mass == (0.01, 0.0, 0.0)
+    assert made.mismatch.inertia == (1.0, 1.1, 1.0)
+
+
+def test_the_number_after_the_last_adds_a_fault() -> None:
+    more = {"fault.1.kind": "total", "fault.1.rotor": 3, "fault.1.time": 2.0}
+    assert [part.kind for part in load_scenario("hover-fault", more).all(FAULT)] == ["step", "total"]
+    with pytest.raises(InputError, match="allowed: 0 to 0 \\(0 is the first\\); fault.1.kind adds one"):
+        load_scenario("hover-fault", {"fault.2.kind": "total"})

@@ -114,7 +114,7 @@ API: dict[str, tuple[str, str, list[str]]] = {
     "errors": (
         "Errors and warnings",
         "What is raised, and what is warned of.",
-        ["InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "VehicleWarning"],
+        ["InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "VehicleWarning", "WindWarning"],
     ),
 }  # fmt: skip
 

@@ -204,7 +204,7 @@ def critical_thrust_to_weight(of: Craft, failed: Iterable[int] = (), channels: i
     inf
     """
     sound = _problem(of, (), channels, None)
-    return critical_scale(sound.without(_failed(failed, len(sound.low)))) * _ratio(sound)
+    return critical_scale(sound.without(failed_motors(failed, len(sound.low)))) * _ratio(sound)
 
 
 def critical_loss_with(
@@ -240,7 +240,7 @@ def critical_loss_with(
     sound = _problem(of, (), channels, thrust_to_weight)
     count = len(sound.low)
     own = whole_number(rotor, "rotor", 1, count) - 1
-    dead = _failed(failed, count)
+    dead = failed_motors(failed, count)
     if own + 1 in dead:
         raise InputError(
             f"failed: got {rotor}, which is the rotor that loses thrust; leave it out of the failed ones"
@@ -323,13 +323,28 @@ def _problem(
     if thrust_to_weight is not None:
         factor = positive(thrust_to_weight, "thrust_to_weight", "1", most=1000.0) / _ratio(problem)
         problem = problem._replace(low=problem.low * factor, high=problem.high * factor)
-    return problem.within(int(channels)).without(_failed(failed, len(problem.low)))
+    return problem.within(int(channels)).without(failed_motors(failed, len(problem.low)))
 
 
-def _failed(failed: Iterable[int], count: int) -> set[int]:
-    """Checked numbers of motors."""
+def failed_motors(failed: Iterable[int], count: int) -> set[int]:
+    """Checked numbers of motors.
+
+    Parameters
+    ----------
+    failed : iterable of int
+    count : int
+        Motors that there are.
+
+    Raises
+    ------
+    InputError
+        If one is no number of a motor, or is named twice.
+    """
     require(failed, Iterable, "failed", "numbers of motors, such as [1, 4]")
-    return {whole_number(number, "failed motor", 1, count) for number in failed}
+    numbers = [whole_number(number, "failed motor", 1, count) for number in failed]
+    if len(set(numbers)) < len(numbers):
+        raise InputError(f"failed: got {short(numbers)}; allowed: each motor once")
+    return set(numbers)
 
 
 def _ratio(problem: HoverProblem) -> float:

@@ -17,10 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from rotorfault.analysis.controllability import Craft, hover_problem
+from rotorfault.analysis.controllability import Craft, failed_motors, hover_problem
 from rotorfault.analysis.hover import torque_reserve
 from rotorfault.autopilot.allocation.effectiveness import Effectiveness, allocated
-from rotorfault.base.bounds import require, whole_number
 from rotorfault.base.one_line import record_line
 from rotorfault.base.text_table import table_lines
 from rotorfault.maths.arrays import Array
@@ -87,8 +86,7 @@ def null_space(of: Craft, failed: Iterable[int] = ()) -> NullSpace:
     """
     B = hover_problem(of).effectiveness
     count = B.shape[1]
-    require(failed, Iterable, "failed", "numbers of motors, such as [1, 4]")
-    dead = {whole_number(number, "failed motor", 1, count) for number in failed}
+    dead = failed_motors(failed, count)
     live = np.array([number not in dead for number in range(1, count + 1)])
     rows = B[:, live] / np.maximum(np.linalg.norm(B, axis=1, keepdims=True), 1e-300)
     _, sizes, vectors = np.linalg.svd(rows)

@@ -48,6 +48,10 @@ def how_to_install(extra: str) -> str:
     return f"in the folder of rotorfault: .venv/bin/python -m pip install -e '.[{extra}]'"
 
 
+class WindWarning(UserWarning):
+    """A wind that is hardly meant: stronger than any storm, or a gust front that the flight does not see."""
+
+
 class ReferenceWarning(UserWarning):
     """A reference can be flown, but is hardly meant."""
 

@@ -137,6 +137,8 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
         scenario = scenario_from(dataset.configuration(data.attrs, path), str(path), allow_code)
         line = f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
         return line, vehicle_lines(scenario)
+    if (built_in := _built_in(path)) is not None:
+        return built_in(path, allow_code)
     text = read_text(path)
     if path.suffix != ".toml":
         allowed = ".toml (vehicle, scenario, study) or .nc (flight)"
@@ -153,7 +155,19 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
         raise InputError(f"{error} (read as a {kind}, for it has {keys})") from None
 
 
-def _check_vehicle(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+def _built_in(path: Path) -> Callable[[Path, bool], tuple[str, list[str]]] | None:
+    """The check of a vehicle, scenario or study that is named, where no file has that name."""
+    name = str(path)
+    if path.exists():
+        return None
+    if name in vehicle_names():
+        return lambda _, allow: _check_vehicle(name, allow)
+    if name in scenario_names():
+        return lambda _, allow: _check_scenario(name, allow)
+    return (lambda _, allow: _check_study(name, allow)) if name in study_names() else None
+
+
+def _check_vehicle(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
     # Brings linear programs, which take longer to load than a check of anything else.
     from rotorfault.analysis.reach import reach_lines
 
@@ -163,7 +177,7 @@ def _check_vehicle(path: Path, allow_code: bool) -> tuple[str, list[str]]:
     return "\n".join([line, *more]), vehicle_warnings(vehicle.vehicle)
 
 
-def _check_scenario(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+def _check_scenario(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
     scenario = load_scenario(path, allow_code=allow_code)
     # Compiles nothing: parts, start and reference, as a flight would have them.
     from rotorfault.flight.assembly import assemble
@@ -176,7 +190,7 @@ def _check_scenario(path: Path, allow_code: bool) -> tuple[str, list[str]]:
     return line, vehicle_lines(scenario)
 
 
-def _check_study(path: Path, allow_code: bool) -> tuple[str, list[str]]:
+def _check_study(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
     from rotorfault.campaigns import run
     from rotorfault.campaigns.load import load_study
     from rotorfault.flight.reference_rows import unflown

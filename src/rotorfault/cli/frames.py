@@ -61,6 +61,8 @@ def frames(
         raise InputError(f"--rotors-lost {rotors_lost}: allowed: 1 or 2; --failed takes any set of motors")
     if json_file is not None:
         in_folder(json_file)  # before anything is computed
+    for name in names or ():
+        _refuse_vehicle(name)
     chosen = list(dict.fromkeys(load_frame(name) for name in names or FRAMES))
     groups = frame_survey.same_motors(chosen)
     # A table of all frames has a line for each group.
@@ -91,3 +93,20 @@ def frames(
     if json_file is not None:
         frame_survey.write_cases(cases, json_file)
         say(f"wrote {len(cases)} cases to {json_file}")
+
+
+def _refuse_vehicle(name: str) -> None:
+    """Say what a vehicle's frame is, and where to see what the vehicle itself can lose."""
+    from rotorfault.model.frames import ALIASES, FRAMES
+    from rotorfault.model.importers.frame_match import number_of
+    from rotorfault.model.vehicle_file import load_vehicle, vehicle_names
+
+    if name in FRAMES or name in ALIASES or not (name in vehicle_names() or name.endswith(".toml")):
+        return
+    file = load_vehicle(name)
+    like = [frame.name for frame in FRAMES.values() if number_of(file, frame) is not None]
+    which = f"its rotors are those of {' and '.join(like)}" if like else "no named frame has its rotors"
+    raise InputError(
+        f"'{name}' is a vehicle, and frames are layouts of motors: {which}; 'rotorfault trim {name}' says what it "
+        "can lose itself, with its own thrust"
+    )

@@ -11,8 +11,16 @@ from rotorfault.analysis.hover import critical_loss, hover_margin
 from rotorfault.analysis.sampling_check import sampled_data_warnings
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.presets import presets, record
-from rotorfault.base.errors import ControllerWarning, FaultWarning, InputError, ReferenceWarning, VehicleWarning
+from rotorfault.base.errors import (
+    ControllerWarning,
+    FaultWarning,
+    InputError,
+    ReferenceWarning,
+    VehicleWarning,
+    WindWarning,
+)
 from rotorfault.flight.reference_rows import unflown
+from rotorfault.flight.wind_lines import wind_lines
 from rotorfault.loop.scores import RATTLING
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.model.block import Context
@@ -53,7 +61,7 @@ def warn(scenario: Scenario, own_controller: bool = False, varied: bool = False,
 
 
 def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = False) -> list[Doubt]:
-    """What about vehicle, faults, controller and reference of a flight is hardly meant; empty if nothing is.
+    """What about vehicle, faults, controller, reference and wind is hardly meant; empty if nothing is.
 
     Parameters
     ----------
@@ -61,7 +69,7 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
     own_controller : bool
         Whether a controller flies that the scenario does not name, and of which nothing is known.
     varied : bool
-        Whether many flights differ in what the scenario holds: then faults and reference are as they are meant.
+        Whether many flights differ in what the scenario holds: then faults, reference and wind are as they are meant.
     """
     found = [Doubt(VehicleWarning, line) for line in vehicle_lines(scenario)]
     if not varied:
@@ -70,6 +78,7 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
         found += [Doubt(ControllerWarning, line) for line in (*sampled_data_warnings(scenario), *_preset(scenario))]
     if not varied:
         found += [Doubt(ReferenceWarning, line) for line in unflown(scenario)]
+        found += [Doubt(WindWarning, line) for line in wind_lines(scenario)]
     return found
 
 

@@ -17,19 +17,23 @@ narrow beside a wrong unit, which is a factor of tens and more.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import Any
 
 from rotorfault.maths.geometry import PerRotor, Vec3, spread
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
+from rotorfault.model.proportion import INERTIAS, LENGTHS, Proportion, times
 from rotorfault.model.signals import Wrench
 from rotorfault.model.vehicle import ROTOR_NUMBERS, Vehicle, rotor_speeds
+from rotorfault.model.vehicle_parts_check import parts
 
 ANGLE = 0.5  # rad, by which the least authority turns
 TIMES = Vec3(0.5, 0.5, 2.0)  # s, about roll, pitch, yaw; our choice: a gust builds up in as much, yaw can wait
 LEAST = Vec3.of(4.0 * ANGLE / t**2 for t in TIMES)  # rad/s^2
 AXES = ("roll", "pitch", "yaw")
 SPARE = 0.2  # of hover's thrust: with less to spare up or down it is thrust that an axis lacks, not its lever
+BESIDE = 0.1  # of the arm: so far from the middle of the rotors a centre of mass takes a tenth of thrust from some
+FAR_AWAY = 1.0  # of the arm: farther out no rotor balances the others
 THRUST = 0.012 * 1.2 * math.pi  # kg/m^3: C_T rho pi
 
 
@@ -48,6 +52,8 @@ def vehicle_warnings(vehicle: Vehicle) -> list[str]:
     """
     units = list(_units(vehicle))
     # Of a moment of inertia in another unit nothing more need be said.
+    if any(line.startswith("centre_of_mass") for line in units):
+        return units
     said = [axis for axis, key in zip(AXES, "xyz", strict=True) if any(f"inertia_{key} =" in line for line in units)]
     return [*units, *(line for axis, line in _authority(vehicle) if axis not in said)]
 
@@ -97,7 +103,7 @@ def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
         line = (
             f"{name}: hover leaves an angular acceleration of {turn:.3g} rad/s^2 ({have}); turning by {ANGLE:g} rad "
             f"within {time:g} s takes {least:g} rad/s^2, so the axis can hardly be controlled; "
-            f"{_remedy(name, spare * vehicle.rotors / (vehicle.mass * vehicle.gravity))}"
+            f"{_remedy(vehicle, name, spare * vehicle.rotors / (vehicle.mass * vehicle.gravity))}"
         )
         yield name, line
 
@@ -105,7 +111,15 @@ def _authority(vehicle: Vehicle) -> Iterator[tuple[str, str]]:
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def _remedy(axis: str, share: float) -> str:
+def _remedy(vehicle: Vehicle, axis: str, share: float) -> str:
+    away = math.hypot(*_middle(vehicle))
+    if share < SPARE and away > BESIDE * max(
+        math.hypot(*at) for at in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)
+    ):
+        return (
+            f"the centre of mass lies {1e3 * away:.3g} mm from the middle of the rotors, so some carry more than "
+            "their share: check centre_of_mass"
+        )
     if share < SPARE:
         return (
             f"hover leaves {100.0 * share:.2g} % of a rotor's thrust to spare: check mass, thrust_min and thrust_max"
@@ -118,66 +132,39 @@ def _remedy(axis: str, share: float) -> str:
 # ------------------------------------------------------------------------------------------------------------- units
 
 
-class _Proportion(NamedTuple):
-    """A number in proportion to others."""
-
-    key: str
-    value: float
-    unit: str
-    what: str  # the proportion in words
-    of: Callable[[float], float]  # the proportion that a value has
-    low: float
-    typical: float
-    high: float
-    meant: Mapping[str, Callable[[float], float]]  # by what the user may have written: the value in `unit`
-
-    @property
-    def fits(self) -> bool:
-        return self.low <= self.of(self.value) <= self.high
-
-    def line(self) -> str:
-        right = {
-            words: value
-            for words, convert in self.meant.items()
-            if self.low <= self.of(value := convert(self.value)) <= self.high
-        }
-        best = min(right, key=lambda words: abs(math.log(self.of(right[words]) / self.typical)), default="")
-        hint = f"if it is {best}, write {right[best]:.4g} {self.unit}" if best else "check its unit"
-        usual = f"usual {self.low:g} {f'to {self.high:g}' if math.isfinite(self.high) else 'and more'}"
-        said = f": {self.what} is {self.of(self.value):.3g}, {usual}" if self.what else f"; {usual}"
-        return f"{self.key} = {self.value:.4g} {self.unit}{said}; {hint}"
-
-
-def _times(factor: float) -> Callable[[float], float]:
-    return lambda value: factor * value
-
-
-LENGTHS = {"in mm": _times(1e-3), "in cm": _times(1e-2), "in inches": _times(0.0254)}
-INERTIAS = {
-    "in g cm^2": _times(1e-7),
-    "in kg cm^2": _times(1e-4),
-    "in kg mm^2": _times(1e-6),
-    "in g m^2": _times(1e-3),
-    "in g mm^2": _times(1e-9),
-}
-
-
 def _units(vehicle: Vehicle) -> Iterator[str]:
     v = vehicle
-    arm = max(math.hypot(x, y) for x, y in zip(v.rotor_x, v.rotor_y, strict=True))
+    # From the middle of the rotors: a centre of mass in another unit is no wrong arm.
+    x, y = _middle(v)
+    arm = max(math.hypot(rx - x, ry - y) for rx, ry in zip(v.rotor_x, v.rotor_y, strict=True))
     what, bounds = "mass over arm^3 [kg/m^3]", (1.0, 120.0, 5000.0)
-    mass = _Proportion("mass", v.mass, "kg", what, lambda m: m / arm**3, *bounds, {"in g": _times(1e-3)})
-    size = _Proportion("longest arm", arm, "m", what, lambda a: v.mass / a**3, *bounds, LENGTHS)
+    mass = Proportion("mass", v.mass, "kg", what, lambda m: m / arm**3, *bounds, {"in g": times(1e-3)})
+    size = Proportion("longest arm", arm, "m", what, lambda a: v.mass / a**3, *bounds, LENGTHS)
     if not size.fits:
         # All else is judged by mass and arm, so nothing more is said.
         yield mass.line() if mass.of(v.mass) > mass.high else f"{size.line()} for x and y of the rotors"
         return
-    for proportion in (*_masses(v, arm), *_each_rotor(v, arm)):
+    away = math.hypot(x, y)
+    if away > FAR_AWAY * arm:
+        # Thrusts of hover, and so the rotors' numbers, are judged by it.
+        units = {words: convert(away) for words, convert in LENGTHS.items() if convert(away) < BESIDE * arm}
+        hint = f"if it is {next(iter(units))}, write m" if units else "check its unit and its sign"
+        yield (
+            f"centre_of_mass = {away:.4g} m from the middle of the rotors: over the arm it is {away / arm:.3g}, "
+            f"usual 0 to {FAR_AWAY:g}; {hint}"
+        )
+        return
+    for proportion in (*_masses(v, arm), *_each_rotor(v, arm), *parts(v, arm)):
         if not proportion.fits:
             yield proportion.line()
 
 
-def _each_rotor(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+def _middle(v: Vehicle) -> tuple[float, float]:
+    """Where the middle of the rotors is, in m from the centre of mass."""
+    return math.fsum(v.rotor_x) / v.rotors, math.fsum(v.rotor_y) / v.rotors
+
+
+def _each_rotor(v: Vehicle, arm: float) -> Iterator[Proportion]:
     """Numbers of the rotors; those that differ for each of them."""
     different = [key for key in ROTOR_NUMBERS if isinstance(getattr(v, key), PerRotor)]
     for rotor in range(v.rotors if different else 1):
@@ -189,21 +176,21 @@ def _each_rotor(v: Vehicle, arm: float) -> Iterator[_Proportion]:
                 yield proportion
 
 
-def _masses(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+def _masses(v: Vehicle, arm: float) -> Iterator[Proportion]:
     for axis, moment in zip("xyz", v.inertia, strict=True):
         what = "radius of gyration, sqrt(inertia / mass), over the arm"
-        yield _Proportion(
+        yield Proportion(
             f"inertia_{axis}", moment, "kg m^2", what, lambda J: math.sqrt(J / v.mass) / arm, 0.02, 0.4, 1.5, INERTIAS
         )
     if v.linear_drag > 0.0:
         what = "speed of fall, m g over it [m/s],"
-        yield _Proportion(
+        yield Proportion(
             "linear_drag", v.linear_drag, "N s/m", what, lambda k: v.mass * v.gravity / k, 2.0, 30.0, math.inf, {}
         )
-    yield _Proportion("gravity", v.gravity, "m/s^2", "", lambda g: g, 1.0, 9.81, 30.0, {})
+    yield Proportion("gravity", v.gravity, "m/s^2", "", lambda g: g, 1.0, 9.81, 30.0, {})
 
 
-def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
+def _rotors(v: Vehicle, arm: float) -> Iterator[Proportion]:
     hover = hover_thrust(v)
 
     def radius(b: float) -> float:
@@ -213,39 +200,44 @@ def _rotors(v: Vehicle, arm: float) -> Iterator[_Proportion]:
         return radius(b) * float(rotor_speeds(v._replace(thrust_coefficient=b), hover)[0])
 
     per_turn = {
-        "in N/rpm^2": _times((30.0 / math.pi) ** 2),
-        "in N/krpm^2": _times((30.0 / math.pi) ** 2 * 1e-6),
-        "in N/Hz^2": _times(0.25 / math.pi**2),
-        "in gf/(rad/s)^2": _times(9.80665e-3),
+        "in N/rpm^2": times((30.0 / math.pi) ** 2),
+        "in N/krpm^2": times((30.0 / math.pi) ** 2 * 1e-6),
+        "in N/Hz^2": times(0.25 / math.pi**2),
+        "in gf/(rad/s)^2": times(9.80665e-3),
     }
     b = v.thrust_coefficient
     speed = float(rotor_speeds(v, hover)[0])
     what = (
         f"speed of the blades' tips in hover, at {speed:.4g} rad/s of blades of about {1e3 * radius(b):.3g} mm [m/s],"
     )
-    yield _Proportion("thrust_coefficient", b, "N/(rad/s)^2", what, tip, 5.0, 50.0, 140.0, per_turn)
+    yield Proportion("thrust_coefficient", b, "N/(rad/s)^2", what, tip, 5.0, 50.0, 140.0, per_turn)
     what = f"radius of the blades, about {1e3 * radius(b):.3g} mm, over the arm"
-    yield _Proportion(
+    yield Proportion(
         "thrust_coefficient", b, "N/(rad/s)^2", what, lambda b: radius(b) / arm, 0.02, 0.6, 1.1, per_turn
     )
     ratio = {
         "k_M in N m s^2": lambda value: value / b,
         "k_F / k_M": lambda value: 1.0 / value,
-        "in mm": _times(1e-3),
-        "in cm": _times(1e-2),
+        "in mm": times(1e-3),
+        "in cm": times(1e-2),
     }
     what = "drag torque over thrust, k_M / k_F, over the arm"
-    yield _Proportion("torque_ratio", v.torque_ratio, "m", what, lambda kappa: kappa / arm, 0.005, 0.1, 1.0, ratio)
+    yield Proportion("torque_ratio", v.torque_ratio, "m", what, lambda kappa: kappa / arm, 0.005, 0.1, 1.0, ratio)
     weights = v.rotor_gain * v.rotors / (v.mass * v.gravity)
-    grams = {"in gf": _times(9.80665e-3), "in mN": _times(1e-3)}
-    yield _Proportion(
+    grams = {"in gf": times(9.80665e-3), "in mN": times(1e-3)}
+    yield Proportion(
         "thrust_max", v.thrust_max, "N", "thrust-to-weight", lambda F: F * weights, 1.0, 2.5, 25.0, grams
     )
+    if v.thrust_min < 0.0:
+        what = "pull backwards over the largest push (thrust_min is 0 for rotors that only push)"
+        yield Proportion(
+            "thrust_min", v.thrust_min, "N", what, lambda low: -low / v.thrust_max, 0.05, 0.5, 1.5, grams
+        )
     lag = {"a time constant in s": lambda tau: 1.0 / tau, "a time constant in us": lambda tau: 1e6 / tau}
-    yield _Proportion("rotor_bandwidth", v.rotor_bandwidth, "rad/s", "", lambda w: w, 2.0, 30.0, 1000.0, lag)
-    yield _Proportion("rotor_gain", v.rotor_gain, "1", "thrust over command", lambda k: k, 0.1, 1.0, 10.0, {})
+    yield Proportion("rotor_bandwidth", v.rotor_bandwidth, "rad/s", "", lambda w: w, 2.0, 30.0, 1000.0, lag)
+    yield Proportion("rotor_gain", v.rotor_gain, "1", "thrust over command", lambda k: k, 0.1, 1.0, 10.0, {})
     if v.rotor_inertia > 0.0:
         disc, what = v.mass * radius(b) ** 2, "inertia of a rotor over m R^2, with R of the thrust coefficient,"
-        yield _Proportion(
+        yield Proportion(
             "rotor_inertia", v.rotor_inertia, "kg m^2", what, lambda J: J / disc, 1e-6, 0.005, 0.1, INERTIAS
         )

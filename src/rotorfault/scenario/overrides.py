@@ -11,10 +11,13 @@ from rotorfault.base.config import is_index
 from rotorfault.base.errors import InputError, short
 from rotorfault.model.vehicle import ROTOR_NUMBERS
 from rotorfault.model.vehicle_file import load_vehicle
-from rotorfault.scenario.mismatch import ROTOR_FACTORS
+from rotorfault.scenario.mismatch import ROTOR_FACTORS, Mismatch
 from rotorfault.scenario.part import change_kind, change_preset
 from rotorfault.scenario.sensed import forget_estimator
 from rotorfault.scenario.slots import SLOTS
+
+VECTORS = {name: field.default for name, field in Mismatch.model_fields.items() if isinstance(field.default, tuple)}
+"""Numbers of a mismatch of which there is one for each axis, as they are where they are not given."""
 
 LISTED = (*ROTOR_NUMBERS, "rotor_bandwidth_down")
 """Numbers of a vehicle file of which rotors may have one each."""
@@ -43,7 +46,9 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
 
     Numbers in the key index lists (``fault.0.loss``). A vehicle given by name is laid out as its table when a key
     below it is set (``vehicle.rotor_bandwidth.value``). A number that may be one for each rotor becomes such a list
-    when one of it is set (``mismatch.rotor_gain.2`` is that of rotor 3). Setting ``kind``, or a table that has one to
+    when one of it is set (``mismatch.rotor_gain.2`` is that of rotor 3), and so does one for each axis that is not
+    given (``mismatch.centre_of_mass.0``). The number after the last of a list of parts adds one to it
+    (``fault.1.kind=total`` beside one fault). Setting ``kind``, or a table that has one to
     a bare name, drops the other settings of that table: they belonged to another kind
     (`rotorfault.scenario.part.change_kind`). Setting ``preset`` drops those that the former preset gave
     (`rotorfault.scenario.part.change_preset`).
@@ -57,12 +62,18 @@ def override(tables: dict[str, Any], key: str, value: Any) -> None:
     here: Any = tables
     for depth, part in enumerate(path):
         if isinstance(here, list):
+            if part == str(len(here)) and last == "kind" and depth == 1 and path[0] in SLOTS:
+                here.append({})  # one more
             here = here[_index(here, part, key)]
         elif isinstance(here, dict):
             inner = here.get(part)
             if here is tables and part == "vehicle" and isinstance(inner, str):
                 # A vehicle's name stands for its file: laid out here, so that single numbers of it can be set.
                 inner = here[part] = load_vehicle(inner).model_dump(mode="json")
+            if part in VECTORS and path[:depth] == ["mismatch"] and inner is None:
+                inner = here[part] = list(VECTORS[part])
+            if here is tables and part in SLOTS and SLOTS[part].many and inner is None:
+                inner = here[part] = []
             if depth == len(path) - 1 and for_rotors(path) and (is_number(inner) or inner is None):
                 inner = here[part] = [1.0 if inner is None else float(inner)] * _rotors(tables)
             if here is tables and part in SLOTS and (shorthand := SLOTS[part].shorthand) is not None:
@@ -124,6 +135,8 @@ def _rotors(tables: Mapping[str, Any]) -> int:
 def _index(items: list[Any], part: str, key: str) -> int:
     if not is_index(part) or int(part) >= len(items):
         allowed = f"0 to {len(items) - 1} (0 is the first)" if items else "none, for the list is empty"
+        if key.partition(".")[0] in SLOTS and items:
+            allowed += f"; {key.partition('.')[0]}.{len(items)}.kind adds one"
         raise InputError(f"{key}: '{part}' is no index into a list of {len(items)}; allowed: {allowed}")
     return int(part)
 
