@@ -139,5 +139,5 @@ def test_one_of_three_axes_is_set_by_its_number() -> None:
 def test_the_number_after_the_last_adds_a_fault() -> None:
     more = {"fault.1.kind": "total", "fault.1.rotor": 3, "fault.1.time": 2.0}
     assert [part.kind for part in load_scenario("hover-fault", more).all(FAULT)] == ["step", "total"]
-    with pytest.raises(InputError, match="allowed: 0 to 0 \\(0 is the first\\); fault.1.kind adds one"):
+    with pytest.raises(InputError, match=r"allowed: 0 to 0 \(0 is the first\); fault.1.kind adds one"):
         load_scenario("hover-fault", {"fault.2.kind": "total"})

@@ -42,13 +42,13 @@ def wind_lines(scenario: Scenario) -> Iterator[str]:
                 f"{scenario.duration:g} s; wind.front.arrival is when it is strongest there"
             )
         elif front.shape == "pulse" and front.arrival + front.length / front.speed <= 0.0:
-            yield f"wind.front has passed the origin before the flight: its arrival is {front.arrival:g} s"
+            yield f"wind.front has passed the origin before the flight: arrival is {front.arrival:g} s"
     if shear is not None and level <= STORM:
         z = HEIGHT + shear.ground
         above = level * float(shear_factor(z, shear.law, space_numbers(settings).shear))
         if above > STORM:
             yield (
-                f"wind.shear: {level:.4g} m/s at the reference height of {shear.reference_height:g} m are {above:.4g} "
+                f"wind.shear: {level:.4g} m/s at reference_height {shear.reference_height:g} m are {above:.4g} "
                 f"m/s at {HEIGHT:g} m, more than the strongest hurricanes have; check wind.shear.reference_height"
             )
         start = scenario.start.position[2] - shear.ground

@@ -33,7 +33,7 @@ LEAST = Vec3.of(4.0 * ANGLE / t**2 for t in TIMES)  # rad/s^2
 AXES = ("roll", "pitch", "yaw")
 SPARE = 0.2  # of hover's thrust: with less to spare up or down it is thrust that an axis lacks, not its lever
 BESIDE = 0.1  # of the arm: so far from the middle of the rotors a centre of mass takes a tenth of thrust from some
-FAR_AWAY = 1.0  # of the arm: farther out no rotor balances the others
+FAR_AWAY = 0.5  # of the arm: from 0.7 on no four rotors of an X balance each other
 THRUST = 0.012 * 1.2 * math.pi  # kg/m^3: C_T rho pi
 
 
@@ -113,9 +113,7 @@ _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 def _remedy(vehicle: Vehicle, axis: str, share: float) -> str:
     away = math.hypot(*_middle(vehicle))
-    if share < SPARE and away > BESIDE * max(
-        math.hypot(*at) for at in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)
-    ):
+    if away > BESIDE * max(math.hypot(*at) for at in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)):
         return (
             f"the centre of mass lies {1e3 * away:.3g} mm from the middle of the rotors, so some carry more than "
             "their share: check centre_of_mass"
