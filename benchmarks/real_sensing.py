@@ -64,14 +64,15 @@ def flown(scenario: str, settings: dict[str, Any], flights: int) -> dict[str, An
         warnings.simplefilter("ignore", RuntimeWarning)  # of flights that were lost at once
         errors = np.sqrt(np.nanmean(distance[200:] ** 2, axis=0))
         farthest, fastest = np.nanmax(distance[300:], axis=0), np.nanmax(np.abs(yaw), axis=0)
+        error, far = float(np.nanmedian(errors)), float(np.nanmedian(farthest))
     low, high = clopper_pearson(int(alive.sum()), flights)
     return {
         "flights": flights,
         "survived": int(alive.sum()),
         "low": float(low),
         "high": float(high),
-        "error": float(np.nanmedian(errors)),
-        "farthest": float(np.nanmedian(farthest)),
+        "error": error,
+        "farthest": far,
         "cost": float(np.median(np.asarray(many.table["cost"], dtype=float))),
         "yaw_rate": float(np.median(fastest[alive])) if alive.any() else None,
         "yaw_rate_lost": float(np.median(fastest[~alive])) if (~alive).any() else None,
@@ -81,7 +82,7 @@ def flown(scenario: str, settings: dict[str, Any], flights: int) -> dict[str, An
 def paper(flights: int) -> dict[str, Any]:
     """The three cases with each set."""
     # Flow and range need a ground that they can see: below all that the cases fly.
-    ground = {"crazyflie": {"ground": -1.5}}
+    ground = {"crazyflie": {"ground": -3.5}}
     return {
         f"{case}, {sensors}": flown(
             case, {"sensors": sensors, **ground.get(sensors, {})}, 1 if sensors == "ideal" else flights
