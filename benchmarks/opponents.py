@@ -2,7 +2,7 @@
 
     python benchmarks/opponents.py [--flights 100] [--only VEHICLE ...] [--cases CASE ...] [--json FILE]
 
-Hover at 10 m, or 2 m to and fro at a rad/s (`tracking`), in wind of 5 m/s with gusts (Dryden, 5 m/s at 6 m) and with
+Hover at 10 m, or a circle of 2 m at a rad/s (`tracking`), in wind of 5 m/s with gusts (Dryden, 5 m/s at 6 m) and with
 noisy sensors; rotors stop, or lose 40 %, at 1 s; 15 s. Controllers that are told of faults have the Luenberger
 observer in the loop; those that are not fly without a diagnosis. Every controller has the preset that the same search
 found for it with the same budget, on `hummingbird`: `hummingbird` for flights that hold yaw, `spin` for total losses,

@@ -43,6 +43,7 @@ CHILDREN: dict[str, list[str]] = {
         "allocation",
         "attainable",
         "total-loss",
+        "opponents",
         "detection",
         "frames",
         "riccati",
