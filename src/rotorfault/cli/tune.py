@@ -13,7 +13,10 @@ from rotorfault.cli.app import AllowCode, Assignments, app, say, stopped
 @app.command()
 def tune(
     controller: Annotated[
-        str, typer.Argument(help="roismc, smc, ismc, sdre, or FILE.py:NAME for a class of your own with `search`.")
+        str,
+        typer.Argument(
+            help="A controller of `rotorfault list controllers`, or FILE.py:NAME for a class of yours with `search`."
+        ),
     ],
     scenarios: Annotated[
         list[str] | None,
