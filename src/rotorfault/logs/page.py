@@ -207,8 +207,10 @@ def _evidence(scans: tuple[Scan, ...], clock: Array, motors: int) -> dict[str, V
         rows = at[inside]
         evidence[inside] = scan.evidence[rows]
         # Each block may be the onset, as the prior has it; all other rotors and no fault stand against it.
-        odds = np.exp(np.minimum(scan.evidence[rows], 300.0)) * SUDDEN / motors / max(len(scan.time), 1)
-        belief[inside] = odds / (1.0 + odds.sum(axis=1, keepdims=True))
+        logs = scan.evidence[rows] + np.log(SUDDEN / motors / max(len(scan.time), 1))
+        most = np.maximum(logs.max(axis=1, keepdims=True), 0.0)
+        odds = np.exp(logs - most)
+        belief[inside] = odds / (np.exp(-most) + odds.sum(axis=1, keepdims=True))
         residual[inside] = scan.residual[rows]
     found = {}
     for k in range(motors):

@@ -29,6 +29,7 @@ TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis b
 REFERENCE, GUARD = 20.0, 1.0  # s whose mean a residual is weighed against, and s between them
 FIRST = 3.0  # s at least before anything is said
 SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
+SIDE, LIKE = 5.0, 4.0  # s on each side of an onset that tell its noise; by how much more it may be behind it
 LASTING, PASSING = 0.05, 8  # loss below which what was found has passed, and how often that is looked for
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)  # s of sums by which the noise is measured
@@ -93,13 +94,33 @@ def scan(residual: Residual) -> Scan:
     residual : Residual
     """
     rho = referenced(residual.values, residual.block)
-    noise = _noise(rho, residual.block)
     for _ in range(PASSING):
-        found, begin = _scanned(residual, rho, noise)
+        _, begin = _scanned(residual, rho, _noise(rho, residual.block))
+        found, begin = _scanned(residual, rho, _noise(_levelled(rho, begin, residual.block), residual.block))
         if found.alarm is None or found.settled is None or found.settled > LASTING:
             break
         rho[begin : begin + int(HOLD / residual.block)] = np.nan
     return found
+
+
+def _levelled(rho: Array, begin: int, block: float) -> Array:
+    """Residuals on both sides of what may be an onset, each less its own level: a loss is not to pass for noise.
+
+    What follows counts where it lasts and is about as calm as what was before: after a crash it says nothing.
+    """
+    least = int(SIDE / block)
+    before, after = rho[:begin], rho[begin + int(SETTLED / block) :]
+    if np.isfinite(before[:, :3]).all(axis=1).sum() < least:
+        return rho
+    if np.isfinite(after[:, :3]).all(axis=1).sum() < least:
+        return before
+    with np.errstate(all="ignore"):
+        used = np.isfinite(after).any(axis=0)
+        level = np.zeros(rho.shape[1])
+        level[used] = np.nanmedian(after[:, used], axis=0)
+        after = after - level
+        calm = np.nanmedian(np.abs(after[:, :3]), axis=0) < LIKE * np.nanmedian(np.abs(before[:, :3]), axis=0)
+    return np.vstack([before, after]) if calm.all() else before
 
 
 def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tuple[Scan, int]:
