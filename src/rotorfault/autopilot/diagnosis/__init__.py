@@ -5,6 +5,7 @@ Importing the package registers every source of diagnosis, so that the registry 
 
 from rotorfault.autopilot.diagnosis.effectiveness_kalman import EffectivenessKalman
 from rotorfault.autopilot.diagnosis.glr import Glr
+from rotorfault.autopilot.diagnosis.injected import Injected
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger
 from rotorfault.autopilot.diagnosis.multiple_model import MultipleModel
 from rotorfault.autopilot.diagnosis.off import Off
@@ -18,6 +19,7 @@ __all__ = [
     "DiagnosisInputs",
     "EffectivenessKalman",
     "Glr",
+    "Injected",
     "Luenberger",
     "MultipleModel",
     "Off",
