@@ -9,6 +9,8 @@ from command_line import run
 from places import EXAMPLES, ROOT
 
 import rotorfault as rf
+from rotorfault.cli.vehicle_layout import layout_lines
+from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 
 PX4 = EXAMPLES / "vehicles" / "x500.params"
 ARDUPILOT = EXAMPLES / "vehicles" / "hexa.param"
@@ -122,3 +124,11 @@ def test_trim_takes_a_loss_of_any_rotor_of_a_frame(name: str, last: int) -> None
     beyond = run("trim", name, "--loss", f"{last + 1}=0.5")
     assert beyond.returncode == 2
     assert f"rotor 1 to {last}" in beyond.stderr
+
+
+def test_places_are_those_that_the_other_program_has() -> None:
+    tables = load_vehicle("x500").model_dump(mode="json")
+    tables["centre_of_mass"] = {"value": [0.01, 0.0, 0.0], "unit": "m", "source": "of this test"}
+    lines = layout_lines(VehicleFile.model_validate(tables), ["0", "1", "2", "3"], "px4")
+    assert lines[-1].endswith("x and y are from the centre of mass")
+    assert any("0.1640" in line and "-0.1740" in line for line in lines)

@@ -32,12 +32,17 @@ def layout_lines(vehicle: VehicleFile, theirs: Sequence[str], form: str, levels:
         for number, (rotor, level) in enumerate(zip(rotors, known, strict=True), start=1)
     )
     rows = [["rotor", form, "where", "x [m]", "y [m]", "turns", "yaw"]]
-    for number, (rotor, their, level) in enumerate(zip(rotors, theirs, known, strict=True), start=1):
+    # As the other program has them: from the centre of mass.
+    for number, (rotor, their, level, (x, y, _)) in enumerate(
+        zip(rotors, theirs, known, vehicle.places, strict=True), start=1
+    ):
         place = place_of(rotor.x.value, rotor.y.value)
         turns = "clockwise" if rotor.yaw == "+" else "counter-clockwise"
         where = ", ".join(filter(None, (place, level)))
-        rows.append([str(number), their, where, f"{rotor.x.value:.4f}", f"{rotor.y.value:.4f}", turns, rotor.yaw])
+        rows.append([str(number), their, where, f"{x:.4f}", f"{y:.4f}", turns, rotor.yaw])
     legend = f"numbers of rotorfault, seen from above; '{form}' is the number that it has there"
+    if vehicle.centre_of_mass is not None:
+        legend += "; x and y are from the centre of mass"
     return [
         *drawing_lines(Frame(vehicle.name, (), motors, REFERENCE)),
         "",

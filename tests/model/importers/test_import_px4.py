@@ -156,7 +156,7 @@ def test_what_is_missing_is_listed_with_how_to_give_it(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"does not say mass, inertia_x, .*, arm; give --mass M") as refused:
         rf.import_vehicle("px4", path, "mine")
     assert "--estimate (but mass and arm)" in str(refused.value)
-    with pytest.raises(InputError, match="--estimate does not estimate mass and arm"):
+    with pytest.raises(InputError, match=r"does not say mass, arm; .*--estimate does not estimate mass and arm"):
         rf.import_vehicle("px4", path, "mine", estimate=True)
     with pytest.raises(InputError, match="SYS_AUTOSTART is 4010; allowed: CA_ROTOR_COUNT"):
         rf.import_vehicle("px4", write(tmp_path, "SYS_AUTOSTART 4010\n"), "mine", mass=1.0, estimate=True)

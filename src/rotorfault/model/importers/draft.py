@@ -244,8 +244,10 @@ def _known(numbers: Mapping[str, Quantity | RotorQuantity], rotors: tuple[Source
 
 def _missing(keys: list[str], estimate: bool) -> str:
     """What is missing and how to give it, in one line."""
-    options = list(dict.fromkeys(OPTIONS[key] for key in keys))
     fixed = [key for key in keys if key in NOT_ESTIMATED]
+    # Of what is estimated anyway nothing need be said.
+    keys = fixed if estimate else keys
+    options = list(dict.fromkeys(OPTIONS[key] for key in keys))
     said = f"does not say {', '.join(keys)}; give {', '.join(options)}"
     if estimate:
         return f"{said}; --estimate does not estimate {' and '.join(fixed)}"
