@@ -30,6 +30,7 @@ CHILDREN: dict[str, list[str]] = {
         "recipes/compare-controllers",
         "recipes/own-detector",
         "recipes/survivable",
+        "recipes/which-motor-failed",
         "recipes/read-a-flight-file",
         "recipes/repeat",
         "recipes/*",
