@@ -147,7 +147,7 @@ class RotorPyPlant:
     def __init__(self, plant: Plant, bandwidth: float, own_motors: bool = False) -> None:
         if not isinstance(plant.model, RigidBody) or plant.ground is not None:
             raise InputError("RotorPy in place of our plant; allowed: plant 'rigid_body', and no ground")
-        self._plant, self._vehicle = plant, _faulty_multirotor(None if own_motors else bandwidth)
+        self._plant, self._vehicle = plant, faulty_multirotor(None if own_motors else bandwidth)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._plant, name)
@@ -259,7 +259,7 @@ def closed_loop(scenario: Scenario, own_motors: bool = False) -> tuple[Apart, Re
     return Apart(*(float(off[:, layout.place(name)].max()) for name in names)), theirs
 
 
-def _faulty_multirotor(bandwidth: float | None) -> Any:
+def faulty_multirotor(bandwidth: float | None) -> Any:
     """RotorPy's vehicle, whose rotors may lose thrust and, with a bandwidth in rad/s, lag in thrust."""
     try:
         # The package is not there for most users.

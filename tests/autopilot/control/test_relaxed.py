@@ -171,3 +171,18 @@ def test_every_law_has_weights_for_a_body_that_spins(name: str) -> None:
     weights = made.parameters(Context(load_vehicle("paper").vehicle, 1e-3)).relaxed.weights
     assert weights.angle > 0.0
     assert weights.rate >= 0.0
+
+
+def test_where_thrust_does_not_carry_a_rotor_that_cannot_pull_takes_no_tilt_of_the_others() -> None:
+    vehicle = mueller()
+    believed = healthy(4)._replace(loss=PerRotor(1.0, 0.0, 0.0, 0.0))
+    # What rotor 2 would have to pull down for drives the two beside it to their limits, where they give no roll.
+    pull = wrench_of(vehicle, PerRotor(0.0, -3.0 * vehicle.thrust_max, 0.0, 0.0)).torque_B
+    turn = wrench_of(vehicle, PerRotor(0.0, 0.0, 0.2 * vehicle.thrust_max, 0.0)).torque_B
+    pull, roll = Vec3(pull.x, pull.y, 0.0), Vec3(turn.x, turn.y, 0.0)
+    asked = Wrench(0.5 * vehicle.mass * vehicle.gravity, pull + roll)
+    carrying, falling = (attainable(vehicle, believed, asked, fades) for fades in (0.0, 1.0))
+    assert falling.thrust < 0.95 * carrying.thrust
+    share = [given.torque_B.dot(roll) / roll.dot(roll) for given in (falling, carrying)]
+    assert share[0] == pytest.approx(1.0, rel=1e-3)
+    assert abs(share[1]) < 0.5
