@@ -69,7 +69,7 @@ test-numpy: .venv-numpy/.stamp ## Run the tests in which something flies without
 	.venv-numpy/$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long and not pages" $(NUMPY_TESTS)
 
 # Both ends of every bound in pyproject.toml: the lowest versions that it allows, and the newest that there are.
-BOUNDS_EXTRAS := flightcode,tune,cluster
+BOUNDS_EXTRAS := flightcode,tune,cluster,export
 BOUNDS_TOOLS := pytest pytest-xdist hypothesis duckdb pandas
 BOUNDS_TESTS := tests/base tests/cli/test_main.py tests/results tests/reference tests/tuning tests/campaigns/store \
   tests/campaigns/report tests/engine/test_engines.py tests/engine/test_cache.py tests/maths
