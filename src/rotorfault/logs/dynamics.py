@@ -33,6 +33,9 @@ LAGS = (0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.1, 0.13)  # s, of rotors: as publ
 # deviation of its logarithm. The built-in vehicles but the paper's have 37 to 130 and 1.8 to 14 with four rotors,
 # 10 to 26 and 0.3 to 7 with more.
 TURNS = {4: ((math.log(60.0), 0.6), (math.log(4.5), 0.8)), 6: ((math.log(18.0), 0.6), (math.log(1.5), 1.0))}
+UNEVEN = (
+    0.04  # of the command in hover: what the thrust of four motors together is not known by, with battery and air
+)
 DEFAULT_LAG = 0.03  # s, where the log does not show it
 BAND = (1.0, 8.0)  # Hz, in which control moves the body more than wind does and noise is not yet the most
 CORRELATED = 0.5  # least correlation of demand and turn with which a gain is believed
@@ -116,7 +119,10 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     centred = demand - np.nanmedian(demand, axis=0)
     rate = np.abs(np.gradient(demand, axis=0)) / length
     doubt = np.sqrt(
-        (response.error * turn) ** 2 + (LEAST_GAIN_ERROR * centred) ** 2 + (0.3 * response.lag * rate) ** 2
+        (response.error * turn) ** 2
+        + (LEAST_GAIN_ERROR * centred) ** 2
+        + (UNEVEN * hover) ** 2
+        + (0.3 * response.lag * rate) ** 2
     )
     up = LEAST_GAIN_ERROR * np.abs(command.mean(axis=1) - hover) + 0.02 * hover
     motors = rows.shape[1]
