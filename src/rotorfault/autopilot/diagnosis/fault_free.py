@@ -266,12 +266,15 @@ def advance(
     lagging = over_inertia(vehicle, wrench_of(vehicle, (memory.lag + lag) * 0.5 * left).torque_B)
     reacting = reaction_sensitivity(lag, e, vehicle)
     reacted = Vec3(0.0, 0.0, reacting - memory.reaction)
-    torque = tuple(_loss_torques(vehicle, thrust, dt))
+    # A rotor that gives nothing does not turn the body about a shifted centre of mass either.
+    shifted = Vec3.of(mean[OFFSETS : OFFSETS + 3]) * (dt / (vehicle.mass * vehicle.gravity))
+    torque = tuple(_loss_torques(vehicle, thrust, dt, shifted))
+    less_thrust = (thrust * (1.0 - left)).sum()
     level_W = inputs.estimate.q_WB.matrix().T.rows
     # Force of the air over mass: drag of the own way, and what the wind adds.
     air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
     lever = _lever_rows(vehicle, air_W.dot(level_W[0]), air_W.dot(level_W[1]))
-    weigh = wrench.thrust / (vehicle.mass * vehicle.gravity)
+    weigh = (wrench.thrust - less_thrust) / (vehicle.mass * vehicle.gravity)
 
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
@@ -286,7 +289,8 @@ def advance(
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
         # Of what turns the body in all, a wrong inertia is wrong by a share; the learned lag is in the model already.
-        learned, moved = row[BANDWIDTH] * mean[BANDWIDTH], getattr(change, name)
+        learned = row[BANDWIDTH] * mean[BANDWIDTH] - less_thrust * getattr(shifted, name)  # the latter stands twice
+        moved = getattr(change, name)
         whole = moved + dot(row, mean) - learned
         share = 1.0 / (1.0 + clip(mean[INERTIA + axis], -LEAST_INERTIA, LEAST_INERTIA))
         row[INERTIA + axis] = -whole * share * share
@@ -338,12 +342,17 @@ def _lifts(vehicle: Vehicle, thrust: PerRotor) -> Vec3:
     return Vec3(side.x, side.y, lift)
 
 
-def _loss_torques(vehicle: Vehicle, thrust: PerRotor, dt: Scalar) -> list[tuple[Scalar, Scalar, Scalar]]:
+def _loss_torques(
+    vehicle: Vehicle, thrust: PerRotor, dt: Scalar, shifted: Vec3
+) -> list[tuple[Scalar, Scalar, Scalar]]:
     """By what in rad/s the rates change over a period if each rotor gives nothing."""
     matrix = effectiveness(vehicle)
     columns = zip(matrix.roll, matrix.pitch, matrix.yaw, strict=True)
     turns = (over_inertia(vehicle, Vec3(*column)) for column in columns)
-    return [tuple(-f * dt * g for g in turn) for f, turn in zip(thrust, turns, strict=True)]
+    return [
+        tuple(-f * (dt * g + d) for g, d in zip(turn, shifted, strict=True))
+        for f, turn in zip(thrust, turns, strict=True)
+    ]
 
 
 def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar, Scalar]:
