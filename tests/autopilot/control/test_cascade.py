@@ -61,6 +61,26 @@ def test_force_limits(f: Vec3, tilt: float, share: float) -> None:
     assert got == pytest.approx(min(asked, room), abs=1e-6)
 
 
+def test_tilt_counts_from_the_force_that_holds_against_the_wind() -> None:
+    numbers = cascade(tilt_max=0.3, thrust_share=1.0, fall_share=0.3).parameters(Context(VEHICLE, 1e-3))
+    most, reach = 4.0 * VEHICLE.thrust_max / VEHICLE.mass, math.tan(0.3) * VEHICLE.gravity
+
+    def sideways(wanted: float, steady: float) -> float:
+        f = Vec3(wanted, 0.0, VEHICLE.gravity)
+        return float(limited_force(f, sound_thrust(VEHICLE), VEHICLE, numbers, Vec3(steady, 0.0, 0.0)).x)
+
+    # As far to either side of it, up to the largest tilt again and to what thrust carries.
+    assert sideways(9.0 * reach, 0.5 * reach) == pytest.approx(1.5 * reach)
+    assert sideways(-9.0 * reach, 0.5 * reach) == pytest.approx(-0.5 * reach)
+    assert sideways(9.0 * reach, 9.0 * reach) == pytest.approx(2.0 * reach)
+    assert sideways(1.2 * reach, 0.5 * reach) == pytest.approx(1.2 * reach)
+    weak = numbers._replace(thrust_share=1.05 * VEHICLE.gravity / most)
+    f = limited_force(
+        Vec3(9.0 * reach, 0.0, VEHICLE.gravity), sound_thrust(VEHICLE), VEHICLE, weak, Vec3(reach, 0.0, 0.0)
+    )
+    assert math.hypot(f.x, f.z) == pytest.approx(1.05 * VEHICLE.gravity)
+
+
 @pytest.mark.parametrize(("bandwidth", "dt"), [(25.0, 1e-3), (25.0, 0.1), (300.0, 0.05)])
 def test_command_filter_is_exact(bandwidth: float, dt: float) -> None:
     """Against SciPy's zero-order hold of w^2/(s + w)^2, also where w dt is far beyond any explicit scheme."""

@@ -49,7 +49,7 @@ def axis_of(
     """Where the axis settles."""
     loss = PerRotor.of(float(rotor == dead) for rotor in range(1, 5))
     believed = healthy(4)._replace(loss=loss)
-    memory = at_rest(parameters, vehicle)
+    memory = at_rest(parameters, vehicle, zeros())
     for _ in range(steps):
         axis = relaxed_axis(memory, vehicle, believed, NO_BALANCE, omega, residual, parameters, 1e-3)
         memory = axis.memory
@@ -103,7 +103,14 @@ def test_with_yaw_in_balance_nothing_is_given_up() -> None:
     for shares, given_up in cases:
         with_yaw = ThrustRange(*(share * weight for share in shares))
         axis = relaxed_axis(
-            at_rest(parameters, vehicle), vehicle, healthy(4), with_yaw, Vec3(0.0, 0.0, 20.0), 0.0, parameters, 1e-3
+            at_rest(parameters, vehicle, zeros()),
+            vehicle,
+            healthy(4),
+            with_yaw,
+            Vec3(0.0, 0.0, 20.0),
+            0.0,
+            parameters,
+            1e-3,
         )
         assert float(axis.given_up) == pytest.approx(given_up, abs=1e-12)
         # Beside too much thrust the spin is braked, beside too little it is let go.
@@ -121,7 +128,7 @@ def test_the_axis_stays_within_its_limit_and_is_finite_at_rest() -> None:
         assert lean <= math.tan(0.2) + 1e-12
     dead = healthy(4)._replace(loss=PerRotor.all(1.0))
     none = relaxed_axis(
-        at_rest(parameters, vehicle), vehicle, dead, NO_BALANCE, Vec3(0.0, 0.0, 5.0), 0.0, parameters, 1e-3
+        at_rest(parameters, vehicle, zeros()), vehicle, dead, NO_BALANCE, Vec3(0.0, 0.0, 5.0), 0.0, parameters, 1e-3
     )
     assert all(np.isfinite([*none.to_B]))
 
@@ -137,7 +144,7 @@ def test_beside_a_rotor_stuck_high_the_others_carry_what_is_left_and_balance_it(
     least = float(least_in_balance(vehicle, believed.loss, believed.stuck))
     assert least == pytest.approx(4.0 * stuck_at * hover)
     parameters = relaxed_parameters(0.3, 0.35, 0.1, WEIGHTS)
-    memory, spin = at_rest(parameters, vehicle), Vec3(0.0, 0.0, -25.0)
+    memory, spin = at_rest(parameters, vehicle, zeros()), Vec3(0.0, 0.0, -25.0)
     for _ in range(3000):
         axis = relaxed_axis(memory, vehicle, believed, ThrustRange(least, 9.0), spin, 0.0, parameters, 1e-3)
         memory = axis.memory

@@ -200,7 +200,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             law.position,
             law.attitude,
             start,
-            at_rest(parameters.relaxed, inputs.vehicle) if relaxes else (),
+            at_rest(parameters.relaxed, inputs.vehicle, estimate.v_W) if relaxes else (),
         )
 
     def step(
@@ -212,18 +212,18 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         w0 = mean_bandwidth(vehicle)
         R_WB = estimate.q_WB.matrix()
 
-        spinning = None
+        spinning, steady_W = None, None
         available = inputs.thrust_available
         if memory.relaxed != ():
             spinning = Spinning(cast("RelaxedMemory", memory.relaxed), parameters.relaxed, inputs, dt)
-            available = spinning.available(parameters.thrust_share)
+            available, steady_W = spinning.available(parameters.thrust_share), spinning.steady_W
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
         position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
         wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
-        force_W = limited_force(wanted, available, vehicle, parameters)
+        force_W = limited_force(wanted, available, vehicle, parameters, steady_W)
 
         # Thrust axis and heading, and how far the body is from them.
         if six_inputs:
@@ -249,14 +249,16 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
             Vec3(w0, w0, w0),
         )
         attitude_memory, inner = self.law.attitude(memory.attitude, attitude, parameters.law, dt)
-        given_B = wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss)).torque_B
+        believed_now = wrench_of(vehicle, believed.stuck.thrust_of(inputs.expected_thrust, believed.loss))
         torque_B = self.tracking.ahead_of_lag(
-            body_momentum(vehicle, inner.u + attitude.feed_forward), given_B, estimate.omega_B, w0
+            body_momentum(vehicle, inner.u + attitude.feed_forward), believed_now.torque_B, estimate.omega_B, w0
         )
         wrench = Wrench(vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min), torque_B)
         relaxed_memory = memory.relaxed
         if spinning is not None:
-            relaxed_memory, wrench = spinning.steer(wrench, given_B, inner.switching)
+            relaxed_memory, wrench = spinning.steer(
+                wrench, believed_now, Vec3(R_WB.xz, R_WB.yz, R_WB.zz), inner.switching
+            )
 
         own = CascadeSignals(
             attitude_demand=turn.demand,

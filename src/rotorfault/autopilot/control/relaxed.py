@@ -42,6 +42,7 @@ from rotorfault.autopilot.control.spin_riccati import (
     optimal,
     spin_gain,
 )
+from rotorfault.autopilot.control.steady_force import SteadyForce
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, clip, greater, maximum, minimum, select, sqrt
@@ -107,6 +108,7 @@ class RelaxedMemory(NamedTuple):
 
     lean: Vec3  # (n_x, n_y)/n_z, and 0
     poles: Poles  # of the closed loop
+    steady: SteadyForce
 
 
 class RelaxedAxis(NamedTuple):
@@ -145,12 +147,11 @@ def relaxed_parameters(reserve: float, lean: float, time: float, weights: SpinWe
     return RelaxedParameters(reserve, math.tan(lean), time, weights)
 
 
-def at_rest(parameters: RelaxedParameters, vehicle: Vehicle) -> RelaxedMemory:
-    """The body's z axis, and the gain of a body that does not spin."""
+def at_rest(parameters: RelaxedParameters, vehicle: Vehicle, v_W: Vec3) -> RelaxedMemory:
+    """The body's z axis, the gain of a body that does not spin, and no steady force at a velocity in m/s."""
     weights = parameters.weights
-    return RelaxedMemory(
-        zeros(), optimal(SpinProblem(0.0, 0.0, mean_bandwidth(vehicle), weights.angle, weights.rate))
-    )
+    poles = optimal(SpinProblem(0.0, 0.0, mean_bandwidth(vehicle), weights.angle, weights.rate))
+    return RelaxedMemory(zeros(), poles, SteadyForce(v_W))
 
 
 def relaxed_axis(

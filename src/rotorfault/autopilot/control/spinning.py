@@ -16,9 +16,10 @@ from rotorfault.autopilot.control.relaxed import (
     relaxed_axis,
     relaxed_torque,
 )
+from rotorfault.autopilot.control.steady_force import observed, unexplained
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
-from rotorfault.model.motion import mean_bandwidth
+from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Wrench
 
 # Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
@@ -60,6 +61,17 @@ class Spinning:
             dt,
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
+        self._unexplained_W = unexplained(memory.steady, estimate.v_W)
+
+    @property
+    def steady_W(self) -> Vec3:
+        """Specific force in m/s^2 that holds against the wind, so far as yaw is given up.
+
+        The largest tilt is for what errors ask for. A vehicle that spins in a wind that takes most of it would have
+        nothing left to come back with; one that holds yaw keeps to the limit that it was given.
+        """
+        force: Vec3 = self._unexplained_W * (-self.axis.given_up)
+        return force
 
     def available(self, share: Scalar) -> Scalar:
         """Largest thrust in N that position control should ask for: that in balance, level or about the axis.
@@ -97,28 +109,36 @@ class Spinning:
             acceleration=axis.to_B @ Vec3(turn.acceleration.x, turn.acceleration.y, turn.acceleration.z * held),
         )
 
-    def steer(self, upright: Wrench, given_B: Vec3, switching_B: Vec3) -> tuple[RelaxedMemory, Wrench]:
+    def steer(self, upright: Wrench, given: Wrench, R_WB: Mat3, switching_B: Vec3) -> tuple[RelaxedMemory, Wrench]:
         """The memory of the next instant, and the wrench to ask for.
 
         Parameters
         ----------
         upright : Wrench
             Of the law that holds yaw.
-        given_B : Vec3, N m
-            Torque that the believed rotors give now.
+        given : Wrench
+            That the believed rotors give now.
+        R_WB : Mat3
+            Attitude.
         switching_B : Vec3, rad/s^2
             Switching input of the law.
         """
         inputs, given_up = self.inputs, self.axis.given_up
         after, torque_B = relaxed_torque(
-            self.axis, self._error, given_B, switching_B, inputs.vehicle, inputs.residual_speed, self.parameters
+            self.axis,
+            self._error,
+            given.torque_B,
+            switching_B,
+            inputs.vehicle,
+            inputs.residual_speed,
+            self.parameters,
         )
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
-        weight = inputs.vehicle.mass * inputs.vehicle.gravity
+        weight = vehicle.mass * vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
         lifts = clip(self.cosine / SIDEWAYS, 0.0, 1.0)
-        relaxed_B = attainable(inputs.vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
-        beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(inputs.vehicle))
+        relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
+        beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         # About yaw what is attainable beside a rotor stuck high is its own: asked for that, it could never show that
         # it is stuck. So the spin is braked there, which costs nothing: yaw is served last.
@@ -126,4 +146,9 @@ class Spinning:
         tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
         yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
         thrust = upright.thrust * (1.0 - free + lifts * free)
+        gravity, v_W = Vec3(0.0, 0.0, inputs.vehicle.gravity), inputs.estimate.v_W
+        explained_W = (
+            axis_W * (given.thrust / inputs.vehicle.mass) + drag_acceleration(inputs.vehicle, -v_W) - gravity
+        )
+        after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))
         return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
