@@ -256,9 +256,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         wrench = Wrench(vehicle.mass * force_W.z / maximum(R_WB.zz, parameters.cos_min), torque_B)
         relaxed_memory = memory.relaxed
         if spinning is not None:
-            relaxed_memory, wrench = spinning.steer(
-                wrench, believed_now, Vec3(R_WB.xz, R_WB.yz, R_WB.zz), inner.switching
-            )
+            relaxed_memory, wrench = spinning.steer(wrench, believed_now, R_WB, inner.switching)
 
         own = CascadeSignals(
             attitude_demand=turn.demand,

@@ -124,14 +124,9 @@ class Spinning:
             Switching input of the law.
         """
         inputs, given_up = self.inputs, self.axis.given_up
+        vehicle, residual_speed = inputs.vehicle, inputs.residual_speed
         after, torque_B = relaxed_torque(
-            self.axis,
-            self._error,
-            given.torque_B,
-            switching_B,
-            inputs.vehicle,
-            inputs.residual_speed,
-            self.parameters,
+            self.axis, self._error, given.torque_B, switching_B, vehicle, residual_speed, self.parameters
         )
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
@@ -146,9 +141,7 @@ class Spinning:
         tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
         yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
         thrust = upright.thrust * (1.0 - free + lifts * free)
-        gravity, v_W = Vec3(0.0, 0.0, inputs.vehicle.gravity), inputs.estimate.v_W
-        explained_W = (
-            axis_W * (given.thrust / inputs.vehicle.mass) + drag_acceleration(inputs.vehicle, -v_W) - gravity
-        )
+        lifted_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz) * (given.thrust / vehicle.mass) - Vec3(0.0, 0.0, vehicle.gravity)
+        explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
         after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))
         return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
