@@ -120,12 +120,13 @@ def read_dataflash(path: Path, wanted: Mapping[str, object]) -> DataflashFile:
     """
     reader = _Reader(wanted)
     try:
-        rest = walk(path, reader.step)
+        rest, packed = walk(path, reader.step)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     lost = reader.lost + rest
     places = f" at {reader.gaps} places" if reader.gaps > 1 else ""
     reason = f"{lost} bytes{places} are no messages: damaged or cut off" if lost else ""
+    reason = "; ".join(filter(None, (packed, reason)))
     messages = {name: one for name, one in reader.messages.items() if name not in TEXTS}
     return DataflashFile(messages, _parameters(reader.messages), _texts(reader.messages), lost, reason)
 

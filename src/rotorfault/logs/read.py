@@ -10,13 +10,14 @@ from rotorfault.logs.dataflash import HEAD as DATAFLASH
 from rotorfault.logs.log import Log
 from rotorfault.logs.px4 import read_px4_log
 from rotorfault.logs.recorded import read_recorded_log
-from rotorfault.logs.stream import opened
+from rotorfault.logs.stream import content, inner_suffix
 from rotorfault.logs.tables import read_table_log
 
 FORMATS = (
     "PX4 ULog (.ulg), ArduPilot dataflash (.bin), Betaflight's decoded blackbox (.csv), a flight of rotorfault "
-    "(flight.nc), a table with documented columns (.csv, .npz)"
+    "(flight.nc), a table with documented columns (.csv, .npz); .ulg, .bin and .csv gzipped too"
 )
+STRANGE = 0.05  # share of bytes that are no text: a third of what any binary file has, more than damage leaves
 NETCDF = (b"\x89HDF", b"CDF\x01", b"CDF\x02")
 
 
@@ -43,15 +44,33 @@ def read_log(path: str | Path) -> Log:
         if not flight.is_file():
             raise InputError(f"{path}: is a folder without a flight.nc; give a flight log")
         return read_recorded_log(flight)
-    with opened(path) as file:
-        head = file.read(4096)
+    with content(path) as log:
+        head = log.file.read(4096)
+        packed, cut = log.packed is not None, log.said()
+    if packed and not head:
+        raise InputError(f"{path}: is {'damaged' if cut else 'empty'} inside its gzip; allowed: {FORMATS}")
     if head[:4] == b"ULog":
         return read_px4_log(path)
-    if head.startswith(NETCDF):
-        return read_recorded_log(path)
-    if head[:2] == DATAFLASH or (path.suffix.lower() == ".bin" and DATAFLASH in head):
+    suffix = inner_suffix(path)
+    if head.startswith(NETCDF) or suffix == ".npz":
+        if packed:
+            raise InputError(f"{path}: is gzipped, though such a file is packed already; unpack it and give that")
+        return read_recorded_log(path) if head.startswith(NETCDF) else read_table_log(path)
+    if head[:2] == DATAFLASH or (suffix == ".bin" and DATAFLASH in head):
         return read_ardupilot_log(path)
-    if path.suffix.lower() == ".npz" or path.suffix.lower() == ".csv" or b"," in head[:2000]:
+    if is_text(head) and (suffix == ".csv" or b"," in head[:2000]):
         return read_table_log(path)
-    what = "is empty" if not head else "is no flight log"
+    what = "is empty" if not head else "is no flight log that is known"
     raise InputError(f"{path}: {what}; allowed: {FORMATS}")
+
+
+def is_text(head: bytes) -> bool:
+    """Whether a file begins as text does, some damaged bytes apart.
+
+    Parameters
+    ----------
+    head : bytes
+    """
+    control = sum(byte < 32 and byte not in b"\t\n\r\f" for byte in head)
+    broken = head.decode("utf-8", "replace").count("\ufffd")
+    return max(control, broken) <= STRANGE * len(head)

@@ -1,12 +1,20 @@
-"""Rows of raw bytes from a long file in bounded memory: a topic that grows too long is thinned, and says so."""
+"""Rows of raw bytes from a long file in bounded memory: a topic that grows too long is thinned, and says so.
+
+A gzipped file is unpacked while it is read, whatever its name. What unpacks to far more than a log could is refused:
+a few megabytes would else keep a reader busy for hours.
+"""
 
 from __future__ import annotations
 
+import gzip
+import io
 import os
 import stat
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +24,9 @@ from rotorfault.base.progress import Bar
 
 CHUNK = 1 << 20  # bytes that are read at once
 ROOM = 12 << 20  # bytes of one topic, beyond which every second row is dropped
+GZIP = b"\x1f\x8b"
+MOST_PACKED, ALWAYS = 100, 64 << 20  # by how much a log may unpack, and bytes that any may unpack to
+CUT = "the gzipped file is damaged or cut off"
 Step = Callable[[bytes, int, bool], int]
 """Takes bytes, where to begin and whether they are the last; says how far they were used."""
 
@@ -53,6 +64,108 @@ class Rows:
         return np.frombuffer(bytes(self._bytes), dtype=self.dtype)
 
 
+class Unpacked(io.RawIOBase):
+    """A gzipped file as what it holds, as far as it goes.
+
+    Parameters
+    ----------
+    file : binary file
+    path : Path
+        For messages.
+
+    Attributes
+    ----------
+    cut : bool
+        Whether it ended before its end, or was damaged there.
+    """
+
+    def __init__(self, file: BinaryIO, path: Path) -> None:
+        super().__init__()
+        self._file, self._path, self._given, self.cut = file, path, 0, False
+        self._most = max(ALWAYS, MOST_PACKED * os.fstat(file.fileno()).st_size)
+        self._inside = gzip.GzipFile(fileobj=file)
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, room: Any) -> int:
+        """Fill some bytes; 0 at the end.
+
+        Raises
+        ------
+        InputError
+            If it unpacks to more than a log of its size could.
+        """
+        try:
+            piece = b"" if self.cut else self._inside.read1(len(room))
+        except (OSError, EOFError, zlib.error):
+            self.cut, piece = True, b""
+        self._given += len(piece)
+        if self._given > self._most:
+            raise InputError(
+                f"{self._path}: unpacks to more than {self._most >> 20:,} MB, {MOST_PACKED} times its size or more, "
+                "as no flight log does; if it is one, unpack it yourself and give that"
+            )
+        room[: len(piece)] = piece
+        return len(piece)
+
+    def at(self) -> int:
+        """Bytes of the gzipped file that were read so far."""
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Close the file too."""
+        self._file.close()
+        super().close()
+
+
+class Content(NamedTuple):
+    """A log that was opened."""
+
+    file: BinaryIO
+    packed: Unpacked | None  # where it is gzipped
+
+    def said(self) -> str:
+        """What is wrong with the gzipped file, as far as it was read; empty if nothing is."""
+        return CUT if self.packed is not None and self.packed.cut else ""
+
+
+def inner_suffix(path: Path) -> str:
+    """How a name ends in lower case, without the ``.gz`` behind it.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    suffix = path.suffix.lower()
+    return Path(path.stem).suffix.lower() if suffix == ".gz" else suffix
+
+
+@contextmanager
+def content(path: Path) -> Iterator[Content]:
+    """What a log holds, gzipped or not.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        If it cannot be opened, is no plain file, or unpacks to more than a log could.
+    """
+    with opened(path) as file:
+        head = file.read(len(GZIP))
+        file.seek(0)
+        if head != GZIP:
+            yield Content(file, None)
+            return
+        packed = Unpacked(file, path)
+        with io.BufferedReader(packed, CHUNK) as inside:
+            yield Content(inside, packed)
+
+
 def opened(path: Path) -> BinaryIO:
     """A plain file for reading; a pipe or a device would be waited for without end.
 
@@ -72,7 +185,7 @@ def opened(path: Path) -> BinaryIO:
     return os.fdopen(handle, "rb")
 
 
-def walk(path: Path, step: Step) -> int:
+def walk(path: Path, step: Step) -> tuple[int, str]:
     """Hand a file on in chunks; what was not used comes again, in front of the next chunk.
 
     Parameters
@@ -85,16 +198,18 @@ def walk(path: Path, step: Step) -> int:
     -------
     int
         Bytes at the end that were not used.
+    str
+        What is wrong with the file that it is packed in; empty if nothing is.
     """
     size = path.stat().st_size
-    with opened(path) as file, Bar(f"reading {path.name}", size, "bytes") as bar:
+    with content(path) as log, Bar(f"reading {path.name}", size, "bytes") as bar:
         rest, done = b"", 0
         while True:
-            fresh = file.read(CHUNK)
+            fresh = log.file.read(CHUNK)
             done += len(fresh)
             chunk = rest + fresh
             used = step(chunk, 0, not fresh)
             rest = chunk[used:]
-            bar.update(done)
+            bar.update(done if log.packed is None else log.packed.at())
             if not fresh:
-                return len(rest)
+                return len(rest), log.said()

@@ -11,7 +11,7 @@ import csv
 import io
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
 from rotorfault.logs.ardupilot import quaternions
 from rotorfault.logs.log import Damage, Layout, Log, Series, named_layout
-from rotorfault.logs.stream import opened
+from rotorfault.logs.stream import content, opened
 from rotorfault.maths.arrays import Array
 from rotorfault.model.frames import ALIASES, FRAMES
 from rotorfault.model.thrust_curve import share_of
@@ -84,7 +84,7 @@ def _csv(path: Path) -> Table:
     rows: list[list[float]] = []
     header: list[str] = []
     bad, every, seen, blocks = 0, 1, 0, []
-    with opened(path) as raw, io.TextIOWrapper(raw, encoding="utf-8", errors="replace", newline="") as file:
+    with content(path) as log, io.TextIOWrapper(log.file, encoding="utf-8", errors="replace", newline="") as file:
         while line := file.readline(LONGEST_LINE):
             if not header:
                 header = _head(line, facts)
@@ -102,14 +102,15 @@ def _csv(path: Path) -> Table:
                 rows = []
                 if sum(map(len, blocks)) * len(header) > 8 * MOST_ROWS:
                     blocks, every = [np.concatenate(blocks)[::2]], 2 * every
+        packed = log.said()
     if rows:
         blocks.append(np.array(rows, dtype=float))
     if not header or not blocks:
         raise InputError(f"{path}: has no line of names with rows of numbers below; allowed: a flight log")
     table = np.concatenate(blocks)
     columns = {name: table[:, k] for k, name in enumerate(header) if np.isfinite(table[:, k]).any()}
-    damage = Damage(bad, f"{bad} rows have not as many cells as there are names") if bad else Damage()
-    return Table(columns, facts, damage)
+    torn = f"{bad} rows have not as many cells as there are names" if bad else ""
+    return Table(columns, facts, Damage(bad, "; ".join(filter(None, (packed, torn)))))
 
 
 def _head(line: str, facts: dict[str, str]) -> list[str]:
@@ -161,9 +162,15 @@ def read_table_log(path: Path) -> Log:
     if "time" in names and any(re.fullmatch(r"motor_\d+", name) for name in names):
         return _documented(path, table)
     raise InputError(
-        f"{path}: has columns {', '.join(sorted(map(one_line, names))[:6])}; allowed: time and motor_1, motor_2, ... "
+        f"{path}: has columns {_some(names)}; allowed: time and motor_1, motor_2, ... "
         "(see docs/logs.md), Betaflight's decoded blackbox, or variables of a Crazyflie such as motor.m1"
     )
+
+
+def _some(names: Iterable[str]) -> str:
+    """A few names of columns, as far as they can be read."""
+    shown = sorted(one_line(name)[:30] for name in names if name and name.isprintable() and "\ufffd" not in name)
+    return ", ".join(shown[:6]) if shown else "without a readable name"
 
 
 def _columns(columns: Mapping[str, Array], *names: str) -> Array | None:

@@ -228,10 +228,10 @@ def read_ulog(path: Path, wanted: Mapping[str, object]) -> ULogFile:
     """
     reader = _Reader(wanted)
     try:
-        rest = walk(path, reader.step)
+        rest, packed = walk(path, reader.step)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    lost, said = reader.lost + rest, []
+    lost, said = reader.lost + rest, [packed] if packed else []
     if lost:
         places = f" at {reader.gaps} places" if reader.gaps > 1 else ""
         said.append(f"{lost} bytes{places} are no messages: damaged or cut off")
