@@ -1,10 +1,11 @@
 """What real sensing costs: the paper's three cases, faults of sensors, and the spin after a total loss.
 
-    python benchmarks/real_sensing.py [--flights 50] [--only paper faults spin] [--json FILE]
+    python benchmarks/real_sensing.py [--flights 50] [--only paper faults spin] [--tracking so3] [--json FILE]
 
 *paper*: the three cases of the paper (set point, sinusoid, square) with each set of sensors, the plant being
 `rigid_body`: the paper's model takes Euler rates for body rates, which no gyro measures. Flights that survive, error
-of position after 2 s (root mean square, median flight), cost J (median).
+of position after 2 s (root mean square, median flight), cost J (median). Attitude is tracked as the paper does it,
+`euler`, or with `--tracking so3` by rotations.
 
 *faults*: hover of a Hummingbird in gusts of 5 m/s, with a set of sensors and a fault of one: the gyro's bias jumps
 by 5 deg/s about x, satellites or cameras are silent for 5 s, the magnetometer freezes. Survived, and the largest
@@ -22,6 +23,7 @@ import argparse
 import itertools
 import json
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -80,14 +82,19 @@ def flown(scenario: str, settings: dict[str, Any], flights: int) -> dict[str, An
     }
 
 
-def paper(flights: int) -> dict[str, Any]:
+def paper(flights: int, tracking: str = "euler") -> dict[str, Any]:
     """The three cases with each set."""
     # Flow and range need a ground that they can see: below all that the cases fly.
     ground = {"crazyflie": {"ground": -3.5}}
     return {
         f"{case}, {sensors}": flown(
             case,
-            {"sensors": sensors, "plant": "rigid_body", **ground.get(sensors, {})},
+            {
+                "sensors": sensors,
+                "plant": "rigid_body",
+                "controller.cascade.tracking": tracking,
+                **ground.get(sensors, {}),
+            },
             1 if sensors == "ideal" else flights,
         )
         for case in CASES
@@ -132,19 +139,21 @@ def spin(flights: int) -> dict[str, Any]:
     return found
 
 
-PARTS = {"paper": paper, "faults": faults, "spin": spin}
+PARTS: dict[str, Callable[..., dict[str, Any]]] = {"paper": paper, "faults": faults, "spin": spin}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=50)
     parser.add_argument("--only", nargs="+", choices=list(PARTS), default=list(PARTS))
+    parser.add_argument("--tracking", choices=("euler", "so3"), default="euler", help="of the paper's cases")
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
     warnings.simplefilter("ignore", rf.ControllerWarning)
     results = {}
     for part in chosen.only:
-        results[part] = PARTS[part](chosen.flights)
+        more = {"tracking": chosen.tracking} if part == "paper" else {}
+        results[part] = PARTS[part](chosen.flights, **more)
         print(f"\n{part:48s} survived (95 %)             error m  farthest m   cost J  yaw rad/s (lost)")
         for name, row in results[part].items():
             share = f"{row['survived']}/{row['flights']} ({100 * row['low']:.1f} to {100 * row['high']:.1f} %)"

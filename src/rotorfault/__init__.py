@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         FaultWarning,
         InputError,
         ReferenceWarning,
+        SensorWarning,
         VehicleWarning,
         WindWarning,
     )
@@ -148,6 +149,7 @@ _HOME = {
     "Vec3": "maths.geometry",
     "Vehicle": "model.vehicle",
     "ReferenceWarning": "base.errors",
+    "SensorWarning": "base.errors",
     "RelaxedHover": "analysis.relaxed_hover",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
@@ -242,6 +244,7 @@ __all__ = [
     "SensorInputs",
     "SensorModel",
     "SensorNoise",
+    "SensorWarning",
     "Sensors",
     "Settings",
     "State",

@@ -47,7 +47,7 @@ def test_what_unpacks_to_far_more_than_a_log_is_refused(
     monkeypatch.setattr(stream, "ALWAYS", 1 << 16)
     bomb = tmp_path / "bomb.gz"
     bomb.write_bytes(gzip.compress(head + b"0,0,0\n" * (1 << 19)))
-    with pytest.raises(InputError, match="unpacks to more than .* unpack it yourself"):
+    with pytest.raises(InputError, match=r"unpacks to more than .* unpack it yourself"):
         read_log(bomb)
 
 

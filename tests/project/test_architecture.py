@@ -50,10 +50,9 @@ LAZY = {
     },
     "rotorfault.campaigns.flight_table": {"polars": "takes longer to load than a table to make"},
     "rotorfault.cli.catalogue": {
-        "rotorfault.campaigns.run": "is needed to check a study, and for no list",
-        "rotorfault.campaigns.load": "the same",
-        "rotorfault.flight.reference_rows": "the same",
+        "rotorfault.campaigns.check": "is needed to check a study, and for no list",
         "rotorfault.flight.assembly": "is needed to check a scenario, and for no list",
+        "rotorfault.flight.doubts": "the same",
         "rotorfault.analysis.reach": "is needed to check a vehicle, and brings scipy",
         "rotorfault.results.dataset": "xarray takes longer to load than a file to check",
     },

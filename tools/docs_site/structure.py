@@ -116,7 +116,10 @@ API: dict[str, tuple[str, str, list[str]]] = {
     "errors": (
         "Errors and warnings",
         "What is raised, and what is warned of.",
-        ["InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "VehicleWarning", "WindWarning"],
+        [
+            "InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "SensorWarning", "VehicleWarning",
+            "WindWarning",
+        ],
     ),
 }  # fmt: skip
 

@@ -52,6 +52,10 @@ class WindWarning(UserWarning):
     """A wind that is hardly meant: stronger than any storm, or a gust front that the flight does not see."""
 
 
+class SensorWarning(UserWarning):
+    """Sensors cannot read what the flight needs: it starts or goes where flow and range have no ground in reach."""
+
+
 class ReferenceWarning(UserWarning):
     """A reference can be flown, but is hardly meant."""
 

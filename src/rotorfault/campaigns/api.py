@@ -10,13 +10,14 @@ from typing import Any, final
 import pyarrow.compute as pc
 
 from rotorfault.base.bounds import require, whole_number
-from rotorfault.base.errors import InputError, short
+from rotorfault.base.errors import InputError, SensorWarning, short
 from rotorfault.base.executors import executor_of
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.base.plain_text import file_name
 from rotorfault.campaigns import run
 from rotorfault.campaigns.changes import KIND, changed, with_files
+from rotorfault.campaigns.check import out_of_reach
 from rotorfault.campaigns.flight_table import FlightTable
 from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.replay import differences, is_changed, replay
@@ -324,6 +325,8 @@ def campaign(
                 say(f"moved aside: {damage.name} ({damage.reason})")
             for scenario in () if complete else checked.scenarios:
                 doubts.warn(scenario, varied=True)
+            for line in () if complete else out_of_reach(checked):
+                warnings.warn(line, SensorWarning, stacklevel=2)
             progress = run.fly(checked, store, executor, say)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(*[str(folder)] * (folder / STUDY).is_file()) from None

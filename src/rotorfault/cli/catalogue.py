@@ -25,6 +25,7 @@ from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.vehicle_lines import vehicle_lines
 
 QUANTITIES = "quantities"
+FileCheck = Callable[[Path | str, bool, Mapping[str, object]], tuple[str, list[str]]]
 
 
 def entries() -> dict[str, dict[str, str]]:
@@ -115,7 +116,9 @@ def write_new(what: str, name: str, folder: Path, force: bool, content: str | No
     return path
 
 
-def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
+def check(
+    path: Path, allow_code: bool = False, settings: Mapping[str, object] | None = None
+) -> tuple[str, list[str]]:
     """Validate a file; a line about what it holds (more of a vehicle), and one for each thing that is hardly meant.
 
     Parameters
@@ -123,13 +126,17 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
     path : Path
     allow_code : bool
         Whether code that the file names may run.
+    settings : mapping, optional
+        Dotted keys and values that a scenario or study is to be flown with.
 
     Raises
     ------
     InputError
         If anything in it is wrong.
     """
+    settings = settings or {}
     if path.suffix == ".nc":
+        _no_settings(path, "flight", settings)
         # xarray takes longer to load than all the rest, and only flight files need it.
         from rotorfault.results import dataset
 
@@ -138,72 +145,77 @@ def check(path: Path, allow_code: bool = False) -> tuple[str, list[str]]:
         line = f"{path}: flight of '{scenario.name}', {len(data['time'])} records, {data.attrs['outcome']}; ok"
         return line, vehicle_lines(scenario)
     if (built_in := _built_in(path)) is not None:
-        return built_in(path, allow_code)
+        return built_in(path, allow_code, settings)
     text = read_text(path)
     if path.suffix != ".toml":
         allowed = ".toml (vehicle, scenario, study) or .nc (flight)"
         raise InputError(f"{path}: ends in '{path.suffix}'; allowed: {allowed}")
     kind, keys = kind_of(parse_toml(text, str(path)), str(path))
-    checks: dict[Kind, Callable[[Path, bool], tuple[str, list[str]]]] = {
+    checks: dict[Kind, FileCheck] = {
         "vehicle": _check_vehicle,
         "scenario": _check_scenario,
         "study": _check_study,
     }
     try:
-        return checks[kind](path, allow_code)
+        return checks[kind](path, allow_code, settings)
     except InputError as error:
         raise InputError(f"{error} (read as a {kind}, for it has {keys})") from None
 
 
-def _built_in(path: Path) -> Callable[[Path, bool], tuple[str, list[str]]] | None:
+def _built_in(path: Path) -> FileCheck | None:
     """The check of a vehicle, scenario or study that is named, where no file has that name."""
     name = str(path)
     if path.exists():
         return None
     if name in vehicle_names():
-        return lambda _, allow: _check_vehicle(name, allow)
+        return lambda _, allow, settings: _check_vehicle(name, allow, settings)
     if name in scenario_names():
-        return lambda _, allow: _check_scenario(name, allow)
-    return (lambda _, allow: _check_study(name, allow)) if name in study_names() else None
+        return lambda _, allow, settings: _check_scenario(name, allow, settings)
+    return (lambda _, allow, settings: _check_study(name, allow, settings)) if name in study_names() else None
 
 
-def _check_vehicle(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
+def _check_vehicle(path: Path | str, allow_code: bool, settings: Mapping[str, object]) -> tuple[str, list[str]]:
     # Brings linear programs, which take longer to load than a check of anything else.
     from rotorfault.analysis.reach import reach_lines
 
+    _no_settings(path, "vehicle", settings)
     vehicle = load_vehicle(path)
     more = [f"  {line}" for line in reach_lines(vehicle.vehicle)]
     line = f"{path}: vehicle '{vehicle.name}', thrust-to-weight {vehicle.thrust_to_weight:.3g}; ok"
     return "\n".join([line, *more]), vehicle_warnings(vehicle.vehicle)
 
 
-def _check_scenario(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
-    scenario = load_scenario(path, allow_code=allow_code)
+def _check_scenario(path: Path | str, allow_code: bool, settings: Mapping[str, object]) -> tuple[str, list[str]]:
+    scenario = load_scenario(path, settings, allow_code=allow_code)
     # Compiles nothing: parts, start and reference, as a flight would have them.
     from rotorfault.flight.assembly import assemble
+    from rotorfault.flight.doubts import doubts
 
     assemble(scenario)
     line = (
         f"{path}: scenario '{scenario.name}', {scenario.duration:g} s of {scenario.vehicle.name} on "
         f"{scenario[PLANT].kind} flown by {scenario[CONTROLLER].kind}, {len(scenario.all(FAULT))} fault(s); ok"
     )
-    return line, vehicle_lines(scenario)
+    return line, [doubt.says for doubt in doubts(scenario)]
 
 
-def _check_study(path: Path | str, allow_code: bool) -> tuple[str, list[str]]:
-    from rotorfault.campaigns import run
-    from rotorfault.campaigns.load import load_study
-    from rotorfault.flight.reference_rows import unflown
+def _check_study(path: Path | str, allow_code: bool, settings: Mapping[str, object]) -> tuple[str, list[str]]:
+    from rotorfault.campaigns.check import checked_study
 
-    study = load_study(path, allow_code=allow_code).resolved()
-    run.check(study)
+    study, lines = checked_study(path, allow_code, settings)
     labels = ", ".join(variant.label for variant in study.variant)
     axes = ", ".join(part.name for part in study.axis)
     line = (
         f"{path}: study '{study.name}' of {study.scenario_name}, {study.cells:,} cells ({axes}), "
         f"{len(study.variant)} variant(s) ({labels}), {study.most_flights:,.0f} flights at most; ok"
     )
-    found: dict[str, None] = {}
-    for scenario in study.scenarios:
-        found |= dict.fromkeys([*vehicle_lines(scenario), *unflown(scenario)])
-    return line, list(found)
+    return line, lines
+
+
+def _no_settings(path: Path | str, kind: str, settings: Mapping[str, object]) -> None:
+    """Refuse settings of what has none to set."""
+    if settings:
+        raise InputError(
+            f"--set {next(iter(settings))}: {path} is a {kind}; --set goes with a scenario, a study or FILE.py:NAME; "
+            + ("change the file" if kind == "vehicle" else "a flight is as it was flown")
+        )

@@ -44,7 +44,11 @@ def check(
     ],
     assignments: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Setting of a part of your own that has no default."),
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Setting of a scenario or study, as for 'rotorfault fly' and 'campaign', or of a part of your own.",
+        ),
     ] = None,
     allow_code: AllowCode = False,
 ) -> None:
@@ -53,22 +57,22 @@ def check(
     A part of your own goes through what every part of rotorfault goes through: all engines give the same numbers, no
     number of its settings is baked into its code, it fails where its inputs are no numbers.
 
-    Example: rotorfault check examples/controller.py:PdController
+    Examples: rotorfault check hover-fault --set sensors=mocap
+    rotorfault check examples/controller.py:PdController
     """
     from rotorfault.base.foreign import is_place
     from rotorfault.cli import catalogue
+    from rotorfault.scenario.overrides import override_all, parse_overrides
 
+    given = parse_overrides(assignments or [])
     if is_place(file) and ".py:" in file:
         from rotorfault.flight.check_block import check_block
-        from rotorfault.scenario.overrides import override_all, parse_overrides
 
         settings: dict[str, object] = {}
-        override_all(settings, parse_overrides(assignments or []))
+        override_all(settings, given)
         say(str(check_block(file, settings)))
         return
-    if assignments:
-        raise InputError("--set sets what a part of your own, FILE.py:NAME, needs; other files say all themselves")
-    line, warnings = catalogue.check(Path(file), allow_code)
+    line, warnings = catalogue.check(Path(file), allow_code, given)
     doubts = {0: "", 1: ", with a warning"}.get(len(warnings), f", with {len(warnings)} warnings")
     first, *more = line.splitlines()
     say("\n".join([f"{first}{doubts}", *more]))

@@ -16,10 +16,12 @@ from rotorfault.base.errors import (
     FaultWarning,
     InputError,
     ReferenceWarning,
+    SensorWarning,
     VehicleWarning,
     WindWarning,
 )
 from rotorfault.flight.reference_rows import unflown
+from rotorfault.flight.sensing_lines import sensing_lines
 from rotorfault.flight.wind_lines import wind_lines
 from rotorfault.loop.scores import RATTLING
 from rotorfault.maths.geometry import PerRotor
@@ -79,6 +81,7 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
     if not varied:
         found += [Doubt(ReferenceWarning, line) for line in unflown(scenario)]
         found += [Doubt(WindWarning, line) for line in wind_lines(scenario)]
+        found += [Doubt(SensorWarning, line) for line in sensing_lines(scenario)]
     return found
 
 

@@ -7,6 +7,7 @@ each, and what is recorded where recording is asked for.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.base.bounds import positive, require, thread_count
-from rotorfault.base.errors import InputError, unknown
+from rotorfault.base.errors import InputError, SensorWarning, unknown
 from rotorfault.base.html import html_note, html_table
 from rotorfault.base.one_line import LONGEST, brief, cut
 from rotorfault.base.progress import Bar
@@ -25,6 +26,7 @@ from rotorfault.flight import doubts
 from rotorfault.flight.assembly import Group, assemble_group, build
 from rotorfault.flight.flight import Flight
 from rotorfault.flight.fly import fly, prepare
+from rotorfault.flight.sensing_lines import sensing_lines
 from rotorfault.flight.sweep import checked_columns, groups_of
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import Vec3
@@ -175,6 +177,9 @@ def fly_many(
     groups = groups_of(checked, columns)
     for group in groups if warn else ():
         doubts.warn(group.scenario, varied=True)
+        if not any(key.startswith(("start", "reference", "ground")) for key in columns):
+            for line in sensing_lines(group.scenario):
+                warnings.warn(line, SensorWarning, stacklevel=2)
     layouts = [build(group.scenario).layout for group in groups] if record else []
     rows = [_rows(record, layout) for layout in layouts] or [()] * len(groups)
     width = len(rows[0])

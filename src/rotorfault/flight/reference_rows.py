@@ -17,6 +17,7 @@ from rotorfault.reference import REFERENCE, Csv, ReferenceSource, ReferenceTable
 from rotorfault.scenario.scenario import Scenario
 
 FASTEST_YAW = math.radians(2000.0)  # rad/s: what the gyros of most autopilots measure
+SEEN = 1000  # instants at which a reference is looked at before a flight
 BELOW = 0.01  # m: what start and reference may be below the ground, by rounding and by the sag of the legs
 
 
@@ -106,6 +107,23 @@ def require_above_ground(
             f"reference: it goes down to {rows[low, 2]:.4g} m at t = {low * period:.4g} s, below the ground, on "
             f"which the vehicle stands at {ground:g} m; keep it there or above{hint}"
         )
+
+
+def heights_of(scenario: Scenario) -> Array:
+    """Heights in m that the reference asks for, at up to a thousand instants; (n,).
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Raises
+    ------
+    InputError
+        If its table is none.
+    """
+    times: Array = np.linspace(0.0, scenario.duration, min(scenario.steps, SEEN), endpoint=False)
+    with np.errstate(all="ignore"):
+        return _checked(scenario[REFERENCE].make(), times).p_W[:, 2]
 
 
 def unflown(scenario: Scenario) -> list[str]:
