@@ -30,12 +30,7 @@ What that leaves out enters as noise: the square of the lag's share, :math:`P_{w
 the rates, which a wrong inertia turns into torque; each lasts about as long as a rotor's lag, so its variance times
 twice that time is the density.
 
-The noise of the gyroscope is its own, and what vibrates: the variance of the measurement follows the innovations,
-
-.. math:: R \leftarrow \max\big(R + \tfrac T{\tau_R}(\min(\nu^2, 9S) - S),\; R_{sensor}\big)
-
-which is at rest where innovations have the variance S that the filter expects. One innovation changes it by no more
-than nine expected ones, so a fault does not make a noise of itself before it is found.
+Noise and range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
 """
 
 from __future__ import annotations
@@ -45,7 +40,7 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import learned_lag
+from rotorfault.autopilot.diagnosis import learned_lag, sensed
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -61,20 +56,17 @@ from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, minimum, select
+from rotorfault.maths.scalar import Scalar, clip, exp, less, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
-from rotorfault.model.sensor_model import SensorNoise
 from rotorfault.model.turbulence import turbulence
 from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
 
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
 
-NOISE_MEMORY = 0.5  # s: time constant of the measured noise; many periods, and few of a flight
-OUTLIER = 9.0  # expected squares that one innovation may count for: three standard deviations
 ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
 LEAST_INERTIA = 0.5  # share by which an inertia may seem to be wrong: more is no wrong model
 TINY = 1e-12  # variance of a loss below which it is known
@@ -115,6 +107,7 @@ class ModelParameters(NamedTuple):
     lag: Scalar  # s: of the rotors
     gyroscope: Scalar  # rad^2/s^2: least variance
     accelerometer: Scalar  # m^2/s^4: least variance
+    end: Scalar | tuple[()]  # rad/s: of the gyroscope's range
 
 
 class ModelMemory(NamedTuple):
@@ -174,17 +167,10 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         drag=over,
         inertia=s.inertia,
         lag=1.0 / w,
-        gyroscope=_variance(context, "rates", s.gyroscope),
-        accelerometer=_variance(context, "specific_force", s.accelerometer),
+        gyroscope=sensed.variance(context, "rates", s.gyroscope),
+        accelerometer=sensed.variance(context, "specific_force", s.accelerometer),
+        end=sensed.end_of_range(context),
     )
-
-
-def _variance(context: Context, sensor: str, least: float) -> float:
-    """Of a number as the sensors' record has it, vibration and all, or of a least noise."""
-    noise = getattr(context.sensors, sensor, ())
-    if not isinstance(noise, SensorNoise):
-        return least**2
-    return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration) ** 2, least**2)
 
 
 def _gradient(settings: ModelSettings, drag: float, arms: float) -> float:
@@ -276,6 +262,11 @@ def advance(
     lever = _lever_rows(vehicle, air_W.dot(level_W[0]), air_W.dot(level_W[1]))
     weigh = (wrench.thrust - less_thrust) / (vehicle.mass * vehicle.gravity)
 
+    beyond: Scalar = 0.0
+    unknown: Scalar = 0.0
+    if not isinstance(p.end, tuple):
+        beyond = sensed.beyond(inputs, p.end)
+        unknown = beyond * p.end * p.end
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
     wrong = _second_order(vehicle, omega_B, lagging, belief, p)
@@ -296,7 +287,7 @@ def advance(
         row[INERTIA + axis] = -whole * share * share
         known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
         rows[RATES + axis] = row
-        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt
+        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt + unknown
     if type(pull) is not float or pull != 0.0:  # a number of a batch, or one that is there
         rows |= {LOSSES + i: {LOSSES + i: -pull * dt} for i in range(vehicle.rotors)}
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
@@ -310,7 +301,7 @@ def advance(
         one = innovation(belief, row, measured, variance)
         belief = follow(belief, one)
         seen.append((row, one))
-        variances.append(_noise_after(variance, one, p.gyroscope, dt))
+        variances.append(sensed.noise_after(variance, one, p.gyroscope, dt * (1.0 - beyond)))
 
     force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
     lifts = _lifts(vehicle, e.thrust)
@@ -325,7 +316,7 @@ def advance(
         one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]), variance + blind)
         belief = follow(belief, one)
         seen.append((row, one))
-        variances_of_force.append(_noise_after(variance, one, p.accelerometer, dt))
+        variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))
 
     lagged = lagged + lag * (belief.mean[BANDWIDTH] - mean[BANDWIDTH])
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
@@ -370,12 +361,6 @@ def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, belief: Belief
     lagged = lagging * belief.of(BANDWIDTH, BANDWIDTH)
     squares = (a * a + b * b for a, b in zip(spun, lagged, strict=True))
     return Vec3(*(2.0 * p.lag * square for square in squares))
-
-
-def _noise_after(variance: Scalar, seen: Innovation, least: Scalar, dt: Scalar) -> Scalar:
-    """Variance of a measured number after one more."""
-    size = minimum(seen.value * seen.value, OUTLIER * seen.variance)
-    return maximum(variance + (size - seen.variance) * (dt / NOISE_MEMORY), least)
 
 
 def believed_losses(belief: Belief, rotors: int) -> PerRotor:
