@@ -249,18 +249,22 @@ def advance(
 
     lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, exp(-mean_bandwidth(vehicle) * period))
     left = 1.0 - believed_losses(belief, vehicle.rotors)
-    lagging = over_inertia(vehicle, wrench_of(vehicle, (memory.lag + lag) * 0.5 * left).torque_B)
+    lagged_wrench = wrench_of(vehicle, (memory.lag + lag) * 0.5 * left)
+    weight = vehicle.mass * vehicle.gravity
+    # Thrust that comes later turns later about a shifted centre of mass, too.
+    late = lagged_wrench.thrust / weight
+    lagging = over_inertia(vehicle, lagged_wrench.torque_B) + Vec3.of(mean[OFFSETS : OFFSETS + 3]) * late
     reacting = reaction_sensitivity(lag, e, vehicle)
     reacted = Vec3(0.0, 0.0, reacting - memory.reaction)
     # A rotor that gives nothing does not turn the body about a shifted centre of mass either.
-    shifted = Vec3.of(mean[OFFSETS : OFFSETS + 3]) * (dt / (vehicle.mass * vehicle.gravity))
+    shifted = Vec3.of(mean[OFFSETS : OFFSETS + 3]) * (dt / weight)
     torque = tuple(_loss_torques(vehicle, thrust, dt, shifted))
     less_thrust = (thrust * (1.0 - left)).sum()
     level_W = inputs.estimate.q_WB.matrix().T.rows
     # Force of the air over mass: drag of the own way, and what the wind adds.
     air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
     lever = _lever_rows(vehicle, air_W.dot(level_W[0]), air_W.dot(level_W[1]))
-    weigh = (wrench.thrust - less_thrust) / (vehicle.mass * vehicle.gravity)
+    weigh = (wrench.thrust - less_thrust) / weight
 
     beyond: Scalar = 0.0
     unknown: Scalar = 0.0
