@@ -85,6 +85,7 @@ def stationary(steps: int, flights: int, loss: float, at: int, seed: int) -> tup
     return np.array(z), np.array(estimate)
 
 
+@pytest.mark.long
 def test_without_a_fault_the_statistic_exceeds_a_threshold_no_more_often_than_computed() -> None:
     """At thresholds low enough to be exceeded often: 1,500 flights of 0.5 s."""
     steps, flights, dt = 500, 1500, 0.001
@@ -140,6 +141,7 @@ TABLES = {
 }
 
 
+@pytest.mark.long
 def test_a_loss_is_found_in_gusts_with_a_wrong_model_and_no_other_rotor_is_blamed() -> None:
     fault = [{"kind": "step", "rotor": 2, "time": 1.2, "loss": 0.3}]
     rotors = np.arange(12) % 4 + 1
@@ -153,12 +155,14 @@ def test_a_loss_is_found_in_gusts_with_a_wrong_model_and_no_other_rotor_is_blame
         assert flights.table["survived"].all()
 
 
+@pytest.mark.long
 def test_a_healthy_vehicle_raises_no_alarm_on_squares() -> None:
     square = {"kind": "square", "amplitude": [2.0, 2.0, 0.5], "period": [4.0, 5.0, 6.0], "time_constant": [0.5] * 3}
     flights = rf.fly_many(scenario_from({**TABLES, "reference": square, "duration": 8.0}, "test"), {"seed": range(8)})
     assert not flights.table["false_alarms"].any()
 
 
+@pytest.mark.long
 def test_a_belief_that_is_taken_back_leaves_no_trace() -> None:
     """A fault that heals is believed no longer, and the loss is a state of no variance again."""
     fault = [

@@ -1,6 +1,6 @@
 r"""How far what gyroscope and accelerometer say can be trusted: their noise, and the ends of their ranges.
 
-**Noise** is that of the sensors' own record, and what vibrates: the variance of a measurement follows the innovations,
+**Noise** is that of the sensors' own record, and what vibrates: the variance of a measurement follows innovations,
 
 .. math:: R \leftarrow \max\big(R + \tfrac T{\tau_R}(\min(\nu^2, 9S) - S),\; R_{sensor}\big)
 
