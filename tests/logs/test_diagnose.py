@@ -14,6 +14,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.logs.baseline import learned, read_baseline, write_baseline
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log
+from rotorfault.logs.recorded import log_of as recorded
 from rotorfault.logs.verdict import LogDiagnosis
 
 UNEVEN = (0.12, -0.1, 0.03, -0.05)
@@ -131,3 +132,18 @@ def test_a_sudden_loss_raises_no_alarm_in_healthy_flights() -> None:
     ]
     assert len(alarms) == 8
     assert alarms == [None] * 8
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_loss_after_which_yaw_cannot_be_held_is_laid_to_its_rotor() -> None:
+    settings = {
+        "vehicle": "x500", "controller.preset": "midsize", "duration": 14.0, "record_period": 0.01,
+        "fault": [{"kind": "step", "rotor": 3, "time": 10.0, "loss": 0.5}], "sensors.kind": "noisy",
+    }  # fmt: skip
+    flight = rf.fly("hover-fault", settings=settings, seed=77)
+    assert abs(float(flight.records()["body_rates"].values[-1, 2])) > 3.0  # rad/s: it spins
+    found = diagnosis_of(recorded(flight.records(), "spins"))
+    assert (found.probable.cause, found.rotor) == ("rotor loss", 3)
+    assert found.probable.probability > 0.95
+    assert found.probable.onset == pytest.approx(10.0, abs=0.1)
+    assert found.probable.loss == pytest.approx(0.5, abs=0.05)

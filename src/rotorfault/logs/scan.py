@@ -21,11 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rotorfault.logs.dynamics import Residual
+from rotorfault.logs.weighing import ratio, weighed
 from rotorfault.maths.arrays import Array
 
 HOURS = 10.0  # between false alarms that are accepted
 LOSSES = np.array([0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
-TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis beyond any normal one
 REFERENCE, GUARD = 20.0, 1.0  # s whose mean a residual is weighed against, and s between them
 FIRST = 3.0  # s at least before anything is said
 SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
@@ -49,7 +49,7 @@ class Scan(NamedTuple):
     rotor: int | None  # index
     loss: float
     alarm: float | None  # s, when the sum passed the threshold
-    scores: Array  # (N,) of each rotor where the evidence is strongest, averaged over losses
+    scores: Array  # (N,) of each rotor where the evidence is strongest, averaged over losses and gains
     free: float  # the same of a push in any direction
     settled: float | None  # loss by what commands settle at, where the flight goes on calmly
 
@@ -144,9 +144,9 @@ def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tupl
         if usable.any():
             scale = np.sqrt(spread**2 + doubt**2)[usable]
             plain = ((now - memory * previous)[usable]) / scale
-            onset_ratio = _ratio(plain, signal[:, :, usable] / scale)
+            onset_ratio = ratio(plain, signal[:, :, usable] / scale).sum(axis=-1)
             kept = (signal - memory * signal_before)[:, :, usable] / scale
-            carried = sums + _ratio(plain, kept)
+            carried = sums + ratio(plain, kept).sum(axis=-1)
             fresh = (onset_ratio > carried) | (k - onsets > hold)
             sums = np.where(fresh, onset_ratio, carried)
             onsets = np.where(fresh, k, onsets)
@@ -165,16 +165,16 @@ def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tupl
     k, sums, onsets = best
     loss, rotor = np.unravel_index(int(np.argmax(sums)), sums.shape)
     begin = int(onsets[loss, rotor])
-    free = _free_shift(rho[begin : k + 1], residual.doubt[begin : k + 1], memory, spread, residual.response.hover)
-    average = np.log(np.mean(np.exp(np.minimum(sums, 700.0)), axis=0) + 1e-300)
+    causes = weighed(residual, rho, (begin, k + 1), memory, spread)
+    rotor = np.argmax(causes.rotors)
     settled = _settled_loss(residual, rho, begin, int(rotor))
     found = said._replace(
         onset=float(residual.time[begin]),
         rotor=int(rotor),
-        loss=_mean_loss(sums[:, rotor]) if settled is None else settled,
+        loss=float(causes.losses[rotor]) if settled is None else settled,
         alarm=None if alarm is None else float(time[alarm]),
-        scores=average,
-        free=free,
+        scores=causes.rotors,
+        free=causes.free,
         settled=settled,
     )
     return found, begin
@@ -193,45 +193,6 @@ def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> flo
     mean = np.nanmedian(rho[after][calm][:, :3], axis=0)
     loss = -float(mean @ shape) / float(shape @ shape) / float(np.median(command[calm, rotor]))
     return min(max(loss, 0.01), 1.0)
-
-
-def _mean_loss(sums: Array) -> float:
-    """Mean of the losses by what speaks for each."""
-    weights = np.exp(sums - sums.max())
-    return float(weights @ LOSSES / weights.sum())
-
-
-def _free_shift(rho: Array, doubt: Array, memory: Array, spread: Array, hover: float) -> float:
-    """What speaks for a lasting push from outside in any direction, in place of a rotor.
-
-    Its size about each axis is averaged over a normal distribution, of wind and a shifted load: a tenth of the
-    command in hover, half of that in yaw.
-    """
-    sizes = np.linspace(-4.0, 4.0, 161)
-    weights = np.exp(-0.5 * sizes**2)
-    weights /= weights.sum()
-    before = np.vstack([np.zeros((1, rho.shape[1])), rho[:-1]])
-    total = 0.0
-    for axis, sd in enumerate(np.array([0.4, 0.4, 0.2, 0.1]) * hover):  # of sums over four motors, and of their mean
-        usable = np.isfinite(rho[:, axis]) & np.isfinite(before[:, axis]) & np.isfinite(doubt[:, axis])
-        if not usable.any():
-            continue
-        scale = np.sqrt(spread[axis] ** 2 + doubt[usable, axis] ** 2)
-        noise = (rho[usable, axis] - memory[axis] * before[usable, axis]) / scale
-        gone = np.where(np.arange(len(rho))[usable] == 0, 1.0, 1.0 - memory[axis])
-        shift = sizes[:, None] * sd * (gone / scale)[None]
-        ratio = _ratio(noise[None, :, None], shift[:, :, None]).sum(axis=1)
-        most = ratio.max()
-        total += most + math.log(float(weights @ np.exp(ratio - most)))
-    return total
-
-
-def _ratio(noise: Array, signal: Array) -> Array:
-    """Logarithm of the likelihood with a signal over that without, summed over axes; both over the spread."""
-    half = 0.5 * (TAIL + 1.0)
-    with_it = np.log1p((noise - signal) ** 2 / TAIL)
-    ratio: Array = half * (np.log1p(noise**2 / TAIL) - with_it).sum(axis=-1)
-    return ratio
 
 
 def _longer(new: Array, block: float) -> float:
