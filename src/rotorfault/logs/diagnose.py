@@ -24,7 +24,9 @@ from rotorfault.logs.trim import PRIOR, Evidence, Trim, directions_of, spread_of
 from rotorfault.logs.verdict import Cause, LogDiagnosis
 
 # How often a flight that is looked at has a rotor that suddenly loses thrust, and a lasting push that begins in it.
-SUDDEN, PUSHED = 0.05, 0.2
+# Of what is met at all, half is taken to begin in flight, since nothing is known of it.
+SUDDEN = 0.5 * PRIOR["rotor loss"]
+PUSHED = 0.5 * (PRIOR["wind"] + PRIOR["centre of mass shifted"])
 TAKE_OFF = 1.5  # s in which the ground is near
 PUSHES = {"wind": 0.6, "centre of mass shifted": 0.3, "drag": 0.1}  # what a push from outside is
 

@@ -37,7 +37,7 @@ UNEVEN = (
     0.04  # of the command in hover: what the thrust of four motors together is not known by, with battery and air
 )
 # s by which yaw leads its command: a rotor that spins up turns the body the other way, by J_r dOmega/dt beside
-# its drag Q; with thrust as Omega^2 that is J_r Omega / (2 Q) times the rate of the command. The built-in vehicles have
+# its drag Q; with thrust as Omega^2 that is J_r Omega / (2 Q) times the rate of the command. Built-in vehicles have
 # 0.06 to 0.28 s, 0.2 s in the middle.
 LEAD = 0.2
 DEFAULT_LAG = 0.03  # s, where the log does not show it

@@ -45,7 +45,7 @@ class Scan(NamedTuple):
     spread: Array  # (4,) of the innovations
     memory: Array  # (4,) share of a residual that remains a block later
     threshold: float
-    onset: float | None  # s, of what has the most evidence, alarm or not
+    onset: float | None  # s, of what raised the alarm
     rotor: int | None  # index
     loss: float
     alarm: float | None  # s, when the sum passed the threshold
@@ -100,6 +100,8 @@ def scan(residual: Residual) -> Scan:
         if found.alarm is None or found.settled is None or found.settled > LASTING:
             break
         rho[begin : begin + int(HOLD / residual.block)] = np.nan
+    if found.alarm is None:  # below the threshold nothing began: what is told has the stated rate of false alarms
+        return found._replace(onset=None, rotor=None, loss=0.0)
     return found
 
 

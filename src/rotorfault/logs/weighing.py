@@ -3,9 +3,9 @@ r"""Which cause explains what begins at an onset best: each rotor, or a push fro
 The test of `scan` finds an onset from block to block, and takes errors of the model as noise of each block. To tell
 causes apart that is too little: a gain of the body's answer that is wrong is wrong in every block alike, and a push
 that is free about each axis would make up for it where a rotor cannot. So the gain about each axis is left open here,
-for rotors as for pushes: with :math:`K e^{\delta}` in place of K the residual is
+for rotors as for pushes: a body that is asked for :math:`\tau` and pushed by s, in units of command, turns by
 
-.. math:: \rho(\delta) = e^{-\delta}\,\dot\omega/K - \tau, \qquad \delta \sim N(0, \sigma_K)
+.. math:: \dot\omega/K = e^{\delta}\,(\tau - \bar\tau + s) + n, \qquad \delta \sim N(0, \sigma_K)
 
 and likelihoods are averaged over :math:`\delta` of each axis and the sizes of each cause.
 
@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorfault.logs.dynamics import LEAST_GAIN_ERROR, Residual
+from rotorfault.logs.trim import SAG, SHIFT, WIND
 from rotorfault.maths.arrays import Array
 
 TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis beyond any normal one
-POINTS = np.linspace(-3.0, 3.0, 121)  # of a normal distribution, in standard deviations
+POINTS = np.linspace(-3.0, 3.0, 61)  # of a normal distribution, in standard deviations
 LOSSES = np.linspace(0.02, 1.0, 50)  # each as likely before as any other
-# What wind and a shifted load turn a vehicle by, as a share of the command in hover of each motor: a centre of mass
-# off by a tenth of the arm; in yaw, which only drag turns, half of that. In thrust, a tenth of the weight.
-PUSH = (0.1, 0.1, 0.05, 0.1)
+BEGUN = (1.0 / 6.0, 0.5, 5.0 / 6.0)  # share of the first block that lies behind the onset
+PUSH = (SHIFT, SHIFT, 0.25 * WIND, SAG)  # what a push turns and lifts by, as in trim: shares of the command in hover
 
 
 class Weighed(NamedTuple):
@@ -67,38 +67,39 @@ def weighed(residual: Residual, rho: Array, span: tuple[int, int], memory: Array
     begin, end = span
     motors, hover = residual.command.shape[1], residual.response.hover
     command = residual.command[begin:end]
-    rotors = np.zeros((len(LOSSES), motors))
-    free = 0.0
+    sizes = np.linspace(-4.0, 4.0, 81)
+    density = np.exp(-0.5 * sizes**2)
+    density /= density.sum()
+    rotors, free = np.zeros((len(BEGUN), len(LOSSES), motors)), np.zeros(len(BEGUN))
     for axis in range(4):
         known = _Axis.of(residual, rho[begin:end], span, axis, float(memory[axis]), float(spread[axis]))
         if known is None:
             continue
-        for k in range(motors):
-            shape = -residual.patterns[axis, k] * known.gone(command[:, k])
-            rotors[:, k] += known.averaged(LOSSES[:, None] * shape)
         size = PUSH[axis] * hover * float(np.abs(residual.patterns[axis]).sum())
-        sizes = np.linspace(-4.0, 4.0, 81)
-        density = np.exp(-0.5 * sizes**2)
-        pushes = known.averaged(size * sizes[:, None] * known.gone(np.ones(len(command)))[None])
-        free += _log_mean(pushes, density / density.sum())
-    even = np.full(len(LOSSES), 1.0 / len(LOSSES))
-    each = np.exp(rotors - rotors.max(axis=0))
-    return Weighed(
-        np.array([_log_mean(rotors[:, k], even) for k in range(motors)]),
-        free,
-        np.asarray(LOSSES @ each / each.sum(axis=0)),
-    )
+        for n, share in enumerate(BEGUN):
+            for k in range(motors):
+                shape = -residual.patterns[axis, k] * known.gone(command[:, k], share)
+                rotors[n, :, k] += known.averaged(LOSSES[:, None] * shape)
+            pushes = known.averaged(size * sizes[:, None] * known.gone(np.ones(len(command)), share)[None])
+            free[n] += _log_mean(pushes, density)
+    each = rotors.reshape(-1, motors)
+    even = np.full(len(each), 1.0 / len(each))
+    weights = np.exp(each - each.max(axis=0))
+    losses = np.tile(LOSSES, len(BEGUN)) @ weights / weights.sum(axis=0)
+    scores = np.array([_log_mean(each[:, k], even) for k in range(motors)])
+    return Weighed(scores, _log_mean(free, np.full(len(BEGUN), 1.0 / len(BEGUN))), np.asarray(losses))
 
 
 class _Axis(NamedTuple):
     """What is known of one axis."""
 
     usable: NDArray[np.bool_]  # (n,) blocks that have a value
-    innovation: Array  # (points, m) with each gain
-    scale: Array  # (m,)
-    weights: Array  # (points,) of the gains
+    gains: Array  # (points,) over the gain that is taken
+    weights: Array  # (points,) of them
+    turned: Array  # (m,) innovation of the turn
+    asked: Array  # (m,) of what commands ask for
+    scale: Array  # (points, m) with each gain
     memory: float
-    still: Array  # (m,) innovation with the gain as it is taken to be
 
     @classmethod
     def of(
@@ -107,34 +108,39 @@ class _Axis(NamedTuple):
         """The blocks of an axis; None where none has a value."""
         begin, end = span
         doubt = residual.doubt[begin:end, axis]
-        turned, error = np.zeros(len(rho)), LEAST_GAIN_ERROR
+        turn, error = np.zeros(len(rho)), LEAST_GAIN_ERROR
         if axis < 3:
-            turned, error = residual.turn[begin:end, axis], float(residual.response.error[axis])
-        left = error**2 - LEAST_GAIN_ERROR**2  # what is the same in every block; the rest changes
-        doubt = np.sqrt(np.maximum(doubt**2 - left * turned**2, 0.0))
-        value = rho[:, axis]
-        before, turned_before = _before(value), _before(turned)
-        usable = np.isfinite(value) & np.isfinite(before) & np.isfinite(doubt)
+            turn, error = residual.turn[begin:end, axis], float(residual.response.error[axis])
+        asked = turn - rho[:, axis]
+        before, turn_before = _before(asked), _before(turn)
+        usable = np.isfinite(asked) & np.isfinite(before) & np.isfinite(doubt)
         if not usable.any():
             return None
-        scale = np.sqrt(spread**2 + doubt[usable] ** 2)
-        off = np.exp(-math.sqrt(max(left, 0.0)) * POINTS)[:, None] - 1.0
-        change = (turned - memory * turned_before)[usable]
-        still = (value - memory * before)[usable]
+        # Errors of a gain that are the same in every block are those of the gains below; the rest changes.
+        changing = (LEAST_GAIN_ERROR * turn) ** 2
+        of_command = np.maximum(doubt**2 - (error * turn) ** 2, 0.0)
+        gains = np.exp(math.sqrt(max(error**2 - LEAST_GAIN_ERROR**2, 0.0)) * POINTS)
+        scale = np.sqrt(spread**2 + changing[usable] + gains[:, None] ** 2 * of_command[usable])
         weights = np.exp(-0.5 * POINTS**2)
-        return cls(usable, still[None] + off * change[None], scale, weights / weights.sum(), memory, still)
+        return cls(
+            usable, gains, weights / weights.sum(), (turn - memory * turn_before)[usable],
+            (asked - memory * before)[usable], scale, memory,
+        )  # fmt: skip
 
-    def gone(self, shape: Array) -> Array:
-        """What a lasting shape adds to each innovation: all of it in the first block, then what memory leaves."""
+    def gone(self, shape: Array, share: float) -> Array:
+        """What a lasting shape adds to each innovation: a share of it in the first block, then what memory leaves."""
+        shape = np.concatenate([share * shape[:1], shape[1:]])
         return np.asarray((shape - self.memory * _before(shape))[self.usable])
 
     def averaged(self, signals: Array) -> Array:
         """Logarithm of the likelihood of each signal (s, m) against none, averaged over gains."""
-        plain = np.log1p((self.still / self.scale) ** 2 / TAIL)
-        off = (self.innovation[:, None, :] - signals[None]) / self.scale
-        logs = 0.5 * (TAIL + 1.0) * (plain - np.log1p(off**2 / TAIL)).sum(axis=2)
-        most = logs.max(axis=0)
-        found: Array = most + np.log(self.weights @ np.exp(logs - most))
+        middle = self.scale[len(self.gains) // 2]
+        still = np.log1p(((self.turned - self.asked) / middle) ** 2 / TAIL).sum()
+        pushed = (self.asked + signals)[:, None, :] * self.gains[:, None]
+        off = np.log1p(((self.turned - pushed) / self.scale) ** 2 / TAIL).sum(axis=2)
+        logs = 0.5 * (TAIL + 1.0) * (still - off) - np.log(self.scale / middle).sum(axis=1)
+        most = logs.max(axis=1)
+        found: Array = most + np.log(np.exp(logs - most[:, None]) @ self.weights)
         return found
 
 
