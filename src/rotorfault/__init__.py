@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         InputError,
         ReferenceWarning,
         SensorWarning,
+        StartWarning,
         VehicleWarning,
         WindWarning,
     )
@@ -151,6 +152,7 @@ _HOME = {
     "ReferenceWarning": "base.errors",
     "SensorWarning": "base.errors",
     "RelaxedHover": "analysis.relaxed_hover",
+    "StartWarning": "base.errors",
     "VehicleWarning": "base.errors",
     "Wind": "plant.wind",
     "WindWarning": "base.errors",
@@ -247,6 +249,7 @@ __all__ = [
     "SensorWarning",
     "Sensors",
     "Settings",
+    "StartWarning",
     "State",
     "TimeInputs",
     "Timing",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import pytest
@@ -30,8 +31,14 @@ WAVE = {"amplitude": [0.0, 0.0, 0.0], "frequency": [1.0, 1.0, 1.0]}
 SQUARE = {"amplitude": [0.0] * 3, "period": [4.0] * 3, "time_constant": [0.5] * 3}
 DEGREES = {
     "roll": ({"start": {"attitude": [10, 0, 0]}}, "10 rad, which is 572.958 degrees.*10 degrees were meant.*0.17453"),
-    "upside down": ({"start": {"attitude": [3, 0, 0]}}, r"a tilt of 171.9 degrees; allowed: up to 90.*\[0.05236, 0"),
-    "pitch": ({"start": {"attitude": [0, -2.5, 0]}}, "a tilt of 143.2 degrees"),
+    "within a turn": ({"start": {"attitude": [5, 0, 0]}}, "5 rad, which is 286.479 degrees.*write 0.087266"),
+    "upside down": (
+        {"plant": "paper_model", "start": {"attitude": [3, 0, 0]}},
+        r"171.9 degrees of tilt; allowed with plant 'paper_model': up to 90.*write 0.05236 and 0$",
+    ),
+    "pitch": (
+        {"plant": "paper_model", "start": {"attitude": [0, -2.5, 0]}}, "143.2 degrees of tilt.*write 0 and -0.04363"
+    ),
     "yaw": ({"start": {"attitude": [0, 0, 90]}}, "90 rad, which is 5156.62 degrees; .*write 1.5708"),
     "rates": ({"start": {"body_rates": [0, 0, 500]}}, "500 rad/s, which is 28647.9 degrees/s; .*write 8.7266"),
     "yaw of a set point": ({"reference": HOVER | {"yaw": 90}}, "yaw: got 90 rad.*write 1.5708"),
@@ -48,6 +55,15 @@ def test_degrees_are_refused_with_a_hint(case: str) -> None:
     tables, message = DEGREES[case]
     with pytest.raises(InputError, match=message):
         scenario(**tables)
+
+
+@pytest.mark.parametrize(("attitude", "hint"), [([3, 0, 0], "0.05236 and 0"), ([0, -2.5, 0], "0 and -0.04363")])
+def test_a_body_that_may_start_upside_down_is_told_of_degrees(attitude: list[float], hint: str) -> None:
+    with pytest.warns(rf.StartWarning, match=f"upside down; if .* degrees were meant, write {hint}$"):
+        rf.fly(scenario(start={"attitude": attitude}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", rf.StartWarning)
+        rf.fly(scenario(start={"attitude": [1.5, 0.0, 3.1]}))
 
 
 def test_columns_are_refused_in_the_same_words() -> None:

@@ -82,7 +82,10 @@ def test_rows_of_a_campaign_depend_on_nothing_that_is_left_out() -> None:
     left_out = {path.relative_to(SOURCE).as_posix() for path in python("campaigns") if path not in counted}
     rest = {name for name in left_out if not name.startswith(("campaigns/report/", "campaigns/store/"))}
     assert rest == {
+        # Its tables are compared as they are.
+        "campaigns/laid_out.py", "campaigns/load.py", "campaigns/studies/__init__.py",
         "campaigns/__init__.py", "campaigns/api.py", "campaigns/changes.py", "campaigns/flight_table.py",
         "campaigns/replay.py", "campaigns/run.py",
-        "campaigns/studies/__init__.py",
+        "campaigns/summaries/__init__.py", "campaigns/summaries/detection.py", "campaigns/summaries/parts.py",
+        "campaigns/summaries/total_loss.py",
     }  # fmt: skip

@@ -53,8 +53,9 @@ def test_no_loss_is_told_of_it(flight: rf.Flight) -> None:
 def test_it_has_not_recovered_whose_yaw_is_off(flight: rf.Flight) -> None:
     assert flight.summary()["recovery_time"] == 0.0, "in place it never was away"
     found = {fact.term: fact for fact in headline(flight.records())}
-    assert found["to recover"].value == "yaw off"
-    assert found["to recover"].look == "fair"
+    back = found["to recover, yaw off"]
+    assert (back.value, back.look) == ("0 s", "fair")
+    assert "at the end its yaw is 0." in back.note
     assert "back within 0.25 m                 never left it, yaw " in str(flight.summary())
 
 

@@ -117,8 +117,8 @@ API: dict[str, tuple[str, str, list[str]]] = {
         "Errors and warnings",
         "What is raised, and what is warned of.",
         [
-            "InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "SensorWarning", "VehicleWarning",
-            "WindWarning",
+            "InputError", "ControllerWarning", "FaultWarning", "ReferenceWarning", "SensorWarning", "StartWarning",
+            "VehicleWarning", "WindWarning",
         ],
     ),
 }  # fmt: skip

@@ -60,6 +60,10 @@ class ReferenceWarning(UserWarning):
     """A reference can be flown, but is hardly meant."""
 
 
+class StartWarning(UserWarning):
+    """A flight begins in an attitude that is hardly meant."""
+
+
 class FaultWarning(UserWarning):
     """Faults that come after the flight, or that no controller can survive."""
 

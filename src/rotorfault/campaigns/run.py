@@ -31,7 +31,8 @@ from rotorfault.flight.sweep import checked_columns, groups_of
 BYTES_PER_FLIGHT = 400
 ROOMS = (
     "campaigns/sampling", "campaigns/axes.py", "campaigns/block.py", "campaigns/flight_set.py", "campaigns/grades.py",
-    "campaigns/rounds.py", "campaigns/detections.py", "campaigns/study.py", "campaigns/varied.py",
+    "campaigns/grading.py", "campaigns/rounds.py", "campaigns/detections.py", "campaigns/study.py",
+    "campaigns/varied.py",
 )  # fmt: skip
 """Of the campaigns' source, what decides which flights there are and what their rows say."""
 Say = Callable[[str], None]

@@ -17,6 +17,7 @@ from rotorfault.base.errors import (
     InputError,
     ReferenceWarning,
     SensorWarning,
+    StartWarning,
     VehicleWarning,
     WindWarning,
 )
@@ -75,6 +76,7 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
     """
     found = [Doubt(VehicleWarning, line) for line in vehicle_lines(scenario)]
     if not varied:
+        found += [Doubt(StartWarning, line) for line in _inverted(scenario)]
         found += [Doubt(FaultWarning, line) for line in (*_late(scenario), *_unattainable(scenario))]
     if not own_controller:
         found += [Doubt(ControllerWarning, line) for line in (*sampled_data_warnings(scenario), *_preset(scenario))]
@@ -104,6 +106,13 @@ def rattling(scores: Mapping[str, Any], controller: str) -> Doubt | None:
         f"average; up to {100.0 * RATTLING:g} % is usual; try a wider boundary layer, a slower preset or "
         "'rotorfault tune --objective quiet'",
     )
+
+
+def _inverted(scenario: Scenario) -> Iterator[str]:
+    """A start upside down: few mean it, and 3 degrees, typed as such, are one."""
+    if (found := scenario.start.inverted) is not None:
+        tilt, meant = found
+        yield f"start.attitude: {tilt}, so the flight begins upside down; {meant}"
 
 
 def _late(scenario: Scenario) -> Iterator[str]:

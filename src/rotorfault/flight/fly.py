@@ -54,7 +54,7 @@ def fly(
 
     Warns of what is hardly meant: a vehicle's numbers (`VehicleWarning`), faults outside the attainable set
     (`FaultWarning`), a preset made for other rotors or commands that rattle (`ControllerWarning`), a reference that
-    is not flown whole (`ReferenceWarning`).
+    is not flown whole (`ReferenceWarning`), a start upside down (`StartWarning`).
 
     Parameters
     ----------

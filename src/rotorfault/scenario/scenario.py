@@ -68,6 +68,19 @@ class Start(Strict):
         default=None, gt=0.0, le=1.0, description="of the battery, 1 full; the voltage is constant if not given"
     )
 
+    @property
+    def inverted(self) -> tuple[str, str] | None:
+        """Of a start upside down: how far it leans, and what to write if degrees were meant; else None."""
+        roll, pitch, _ = self.attitude
+        cosine = math.cos(roll) * math.cos(pitch)
+        if cosine >= 0.0:
+            return None
+        return (
+            f"roll {roll:g} and pitch {pitch:g} rad, {math.degrees(math.acos(cosine)):.4g} degrees of tilt",
+            f"if {roll:g} and {pitch:g} degrees were meant, write "
+            f"{math.radians(roll):.4g} and {math.radians(pitch):.4g}",
+        )
+
 
 def _vehicle(value: Any) -> VehicleFile:
     if isinstance(value, VehicleFile):
@@ -195,13 +208,12 @@ class Scenario(Strict):
         return self
 
     def _require_upright(self) -> None:
-        roll, pitch, _ = self.start.attitude
-        cosine = math.cos(roll) * math.cos(pitch)
-        if cosine < 0.0 and not getattr(self[PLANT].factory, "upside_down", 0.0) > 0.0:
+        if self.start.inverted and not getattr(self[PLANT].factory, "upside_down", 0.0) > 0.0:
+            tilt, meant = self.start.inverted
             raise refusal(
                 "start.attitude",
-                f"got roll {roll:g} and pitch {pitch:g} rad, {math.degrees(math.acos(cosine)):.4g} degrees of tilt; "
-                f"allowed with plant '{self[PLANT].kind}': up to 90 degrees, where its equations of motion end",
+                f"got {tilt}; allowed with plant '{self[PLANT].kind}': up to 90 degrees, where its equations end; "
+                f"{meant}",
             )
 
     def _require_battery(self) -> None:
