@@ -24,6 +24,7 @@ EXAMPLES = {
     "text": 40,
     "flight file": 8,
     "log": 20,
+    "command line": 30,
 }
 
 

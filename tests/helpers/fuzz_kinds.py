@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from fuzz_commands import command_ends_well, command_lines
 from fuzz_inputs import (
     STEPS,
     assignments,
@@ -237,6 +238,7 @@ KINDS: dict[str, Kind] = {
         Kind("vary", columns(), _fly_columns),
         Kind("text", texts(), _read_bytes),
         Kind("log", st.tuples(st.sampled_from(sorted(LOG_WRITERS)), st.integers(0, 2**32 - 1)), _read_log),
+        Kind("command line", command_lines(), command_ends_well),
         Kind("flight file", flight_files(), _read_flight),
     )
 }
