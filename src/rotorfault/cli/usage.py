@@ -70,7 +70,9 @@ def _value(parameter: Any, given: Sequence[str]) -> str:
 
 def _allowed(parameter: Any, text: str) -> str:
     """What an option takes: all that are checked here are numbers."""
-    low, high = (getattr(parameter, end, None) for end in ("min", "max"))
+    # typer 0.26 keeps the bounds in the option's type, later ones in the option.
+    bounded = parameter if hasattr(parameter, "min") else getattr(parameter, "type", None)
+    low, high = (getattr(bounded, end, None) for end in ("min", "max"))
     whole = "int" in text or low is not None
     span = "" if low is None else f" from {low:g} on" if high is None else f" from {low:g} to {high:g}"
     return f"a {'whole ' * whole}number{span}"
