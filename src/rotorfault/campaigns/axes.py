@@ -60,8 +60,25 @@ def _times(values: Mapping[str, NDArray[Any]], column: Any, *keys: str) -> Colum
     """Times of the first fault; or of one for each rotor, which never comes where nothing is lost."""
     count = struck_of(values)
     if count:
-        column = np.where(np.asarray(values.get("loss", 1.0), dtype=float) > 0.0, column, BEYOND + column)
+        lasting = np.asarray(values.get("flicker", 0.0), dtype=float) == 0.0
+        begins = lasting & (np.asarray(values.get("loss", 1.0), dtype=float) > 0.0)
+        column = np.where(begins, column, BEYOND + column)
     return {f"fault.{number}.{key}": column for number in range(count or 1) for key in keys}
+
+
+VIBRATION = {"sensors.imu.gyro_vibration": 0.3, "sensors.imu.accelerometer_vibration": 5.0}
+"""Amplitudes of strong vibration, in rad/s and m/s^2."""
+
+
+def _flicker(values: Mapping[str, NDArray[Any]]) -> Columns:
+    """Period of the faults that come and go, one for each rotor, after those that last."""
+    if "onset" not in values or not (count := struck_of(values)):
+        raise InputError("axis 'flicker' needs 'onset' and a rotor that is struck, such as 'rotor_of_four'")
+    period, onset = (np.asarray(values[name], dtype=float) for name in ("flicker", "onset"))
+    comes = (period > 0.0) & (np.asarray(values.get("loss", 1.0), dtype=float) > 0.0)
+    columns = {"start": np.where(comes, onset, BEYOND + onset), "period": np.where(period > 0.0, period, 1.0)}
+    columns["end"] = columns["start"] + BEYOND
+    return {f"fault.{count + k}.{key}": column for k in range(count) for key, column in columns.items()}
 
 
 def _onset(values: Mapping[str, NDArray[Any]]) -> Columns:
@@ -76,7 +93,10 @@ def _struck(count: int) -> Callable[[Mapping[str, NDArray[Any]]], Columns]:
     def keys(values: Mapping[str, NDArray[Any]]) -> Columns:
         loss = values.get("loss", np.ones(1))
         which = np.asarray(values[STRUCK[count]], dtype=float)
-        return {f"fault.{number}.loss": np.where(which == number + 1.0, loss, 0.0) for number in range(count)}
+        # With 'flicker' there are as many faults again, which come and go.
+        sets = 2 if "flicker" in values else 1
+        faults = [(number, which == number % count + 1.0) for number in range(sets * count)]
+        return {f"fault.{number}.loss": np.where(hit, loss, 0.0) for number, hit in faults}
 
     return keys
 
@@ -118,6 +138,10 @@ AXES: dict[str, Axis] = {
     ),
     "onset": Axis("s", "time of the first fault", _onset, (0.0, np.inf)),
     "ramp": Axis("s", "length of the first fault's ramp (kind ramp), which begins at onset", _ramp, (0.0, np.inf)),
+    "flicker": Axis(
+        "s", "period of a loss that comes and goes, 0 for one that lasts (with rotor_of_four and so on: the timeline "
+        "has a fault of the kind intermittent for each rotor, after those that last)", _flicker, (0.0, np.inf),
+    ),
     "second_rotor": Axis("", "rotor of the second fault", _key("second_rotor", "fault.1.rotor"), (1, MOST_ROTORS)),
     "second_loss": Axis("1", "loss of the second fault", _key("second_loss", "fault.1.loss"), (0.0, 1.0)),
     "second_onset": Axis("s", "time of the second fault", _key("second_onset", "fault.1.time"), (0.0, np.inf)),
@@ -160,6 +184,11 @@ AXES: dict[str, Axis] = {
     ),
     "sensor_noise": Axis(
         "1", "factor on the standard noise (sensors noisy)", _noise, (0.0, np.inf)
+    ),
+    "vibration": Axis(
+        "1", "of the rotors on the IMU, over 0.3 rad/s and 5 m/s^2 (sensors with an imu)",
+        lambda values: {k: most * np.asarray(values["vibration"], dtype=float) for k, most in VIBRATION.items()},
+        (0.0, np.inf),
     ),
     "sensor_delay": Axis(
         "", "sampling periods by which measurements come late (sensors noisy)", _key("sensor_delay", "sensors.delay"),

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 import pytest
 from gates import needs_simd
@@ -14,7 +15,10 @@ from scipy.stats import poisson
 from summary_studies import DETECTION
 
 import rotorfault
-from rotorfault.campaigns.summaries.detection import garwood
+from rotorfault.campaigns.axes import BEYOND, columns
+from rotorfault.campaigns.load import load_study
+from rotorfault.campaigns.study import study_from
+from rotorfault.campaigns.summaries.detection import detection, garwood
 
 KEYS = {
     "vehicle",
@@ -117,3 +121,84 @@ def test_grades_say_what_the_numbers_say(flown: Path) -> None:
     assert right.height > 0
     assert (right["flagged_others"] == 0).all()
     assert set(table.filter("success")["grade"]) <= {"right rotor", "quiet"}
+
+
+@needs_simd
+def test_a_row_counts_the_flights_found_within_a_time(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet")
+    for row in content_of(flown)["losses"]:
+        mine = table.filter(
+            pl.col("loss") == row["loss"],
+            pl.col("variant") == row["variant"],
+            pl.col("grade").is_in(["right rotor", "others too"]),
+        )
+        within = {f"{ms} ms": mine.filter(pl.col("delay") <= ms / 1000.0).height for ms in (45, 130, 300, 2000)}
+        assert row["within"] == within
+
+
+@needs_simd
+def test_isolation_is_predicted_by_what_is_told_apart_and_measured_by_the_table(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet")
+    told = {one.rotor: one for one in rotorfault.told_apart("hummingbird").singles}
+    rows = content_of(flown)["isolation"]
+    assert {row["rotor"] for row in rows} == set(told)
+    for row in rows:
+        mine = table.filter(pl.col("variant") == "as it is", pl.col("struck") == row["rotor"])
+        named = mine["flagged_first"].to_list()
+        assert row["flights"] == mine.height
+        assert row["measured"] == pytest.approx([named.count(k) / mine.height for k in range(5)])
+        found = mine.filter(pl.col("loss") >= told[row["rotor"]].least_loss).height
+        assert row["predicted"][row["rotor"]] == pytest.approx(found / mine.height)
+        assert sum(row["predicted"]) == pytest.approx(1.0)
+
+
+@needs_simd
+def test_a_wanted_rate_stands_beside_the_one_that_was_had(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet").to_arrow()
+    healthy = pl.from_arrow(table).filter(pl.col("loss") == 0.0, pl.col("variant") == "eager")  # type: ignore[union-attr]
+    had = healthy["false_alarms"].sum() / (healthy["end_time"].sum() / 3600.0)
+    for wanted, said in ((0.01, "more"), (3600.0, "no more" if had < 1000.0 else "within the interval")):
+        settings = {"diagnosis": {"kind": "glr", "false_alarms": wanted}}
+        variants = [{"label": label, "settings": settings} for label in ("as it is", "eager")]
+        study = study_from(DETECTION | {"variant": variants}, "study")
+        rows = detection(study, table).files["detection.json"]["wanted"]
+        row = next(one for one in rows if one["variant"] == "eager")
+        assert (row["wanted"], row["per_hour"], row["so"]) == (wanted, pytest.approx(had), said)
+
+
+def test_a_loss_that_comes_and_goes_takes_the_place_of_the_one_that_lasts() -> None:
+    values = {
+        "loss": np.array([0.25, 0.25, 0.0]),
+        "ramp": np.zeros(3),
+        "flicker": np.array([0.5, 0.0, 0.5]),
+        "rotor_of_four": np.array([2.0, 2.0, 2.0]),
+        "onset": np.array([1.5, 1.5, 1.5]),
+    }
+    found = columns(values)
+    for rotor in range(4):
+        lost = [0.25, 0.25, 0.0] if rotor == 1 else [0.0, 0.0, 0.0]
+        assert found[f"fault.{rotor}.loss"].tolist() == found[f"fault.{rotor + 4}.loss"].tolist() == lost
+        lasts, comes = found[f"fault.{rotor}.start"], found[f"fault.{rotor + 4}.start"]
+        assert (lasts < BEYOND).tolist() == [False, True, False]
+        assert (comes < BEYOND).tolist() == [True, False, False]
+        assert (found[f"fault.{rotor + 4}.end"] > comes).all()
+    assert found["fault.4.period"][0] == 0.5
+
+
+def test_a_loss_cannot_come_and_go_without_a_rotor() -> None:
+    with pytest.raises(rotorfault.InputError, match="'flicker' needs 'onset' and a rotor"):
+        columns({"loss": np.array([0.2]), "flicker": np.array([0.5]), "onset": np.array([1.0])})
+
+
+@pytest.mark.parametrize("name", ["detection", "detection-rate"])
+def test_all_vehicles_meet_all_manoeuvres_with_real_sensors(name: str) -> None:
+    study = load_study(name)
+    first = {axis.name: axis.case[0] for axis in study.case_axes}
+    vehicles = next(axis.case for axis in study.case_axes if axis.name == "vehicle")
+    sets = set()
+    for vehicle in vehicles:
+        scenario = study.scenario_of(0, tuple({**first, "vehicle": vehicle}.values()))
+        sets.add((str(scenario.vehicle.name), scenario.sensors.kind, scenario.estimator.kind))
+    assert {one[1] for one in sets} == {"mocap", "gps-consumer", "crazyflie"}
+    assert {one[2] for one in sets} == {"eskf"}
+    assert len(sets) == 6

@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 
 from rotorfault.campaigns.report.axis_drawing import colours
 from rotorfault.campaigns.report.line_figure import look
-from rotorfault.campaigns.summaries.parts import Curves, Shares, Summary
+from rotorfault.campaigns.summaries.parts import Curves, Rates, Shares, Summary
 from rotorfault.report.style import STYLE, new_figure, shown
 
 ROW_HIGH = 0.52  # cm
 MOST_LABEL = 26  # characters
+MOST_RATE_LABEL = 48
 SHORT = 8  # characters of a column's name that fits above its neighbour's
 MOST_FIELDS = 24  # beside each other with letters of the usual size
 DARK = 0.6  # share from which on a field is too dark for black letters
@@ -28,7 +29,13 @@ def summary_figures(summary: Summary) -> dict[str, Figure]:
     summary : Summary
     """
     with rc_context(STYLE):
-        return {one.name: _fields(one) if isinstance(one, Shares) else _lines(one) for one in summary.figures}
+        return {one.name: _drawn(one) for one in summary.figures}
+
+
+def _drawn(one: Shares | Curves | Rates) -> Figure:
+    if isinstance(one, Rates):
+        return _rates(one)
+    return _fields(one) if isinstance(one, Shares) else _lines(one)
 
 
 def _fields(one: Shares) -> Figure:
@@ -76,8 +83,29 @@ def _lines(one: Curves) -> Figure:
     axes.set_xlabel(one.x_title)
     axes.set_ylabel(one.y_title)
     axes.set_ylim(-0.03, 1.03)
-    if one.x_log:
+    if one.x_log and min(float(x.min()) for x, *_ in one.lines.values()) > 0.0:
+        axes.set_xscale("log")
+    elif one.x_log:
         axes.set_xscale("symlog", linthresh=LEAST_RATE)
         axes.set_xlim(left=-0.2 * LEAST_RATE)
     figure.legend(loc="outside right center")
+    return figure
+
+
+def _rates(one: Rates) -> Figure:
+    """Points with intervals under each other; what was asked for as an upright stroke."""
+    figure = new_figure(2.0 + 0.42 * len(one.labels))
+    axes = figure.subplots()
+    at = np.arange(len(one.labels))
+    ends = [np.maximum(one.rate - one.low, 0.0), np.maximum(one.high - one.rate, 0.0)]
+    style = {**look(0), "linestyle": "none", "markersize": 3.5, "capsize": 2.0, "elinewidth": 0.9}
+    axes.errorbar(one.rate, at, xerr=ends, marker="o", label="had, with its interval", **style)
+    if np.isfinite(one.wanted).any():
+        axes.plot(one.wanted, at, "|", markersize=10.0, color="black", label="wanted")
+    axes.set_yticks(at, [shown(label, MOST_RATE_LABEL) for label in one.labels])
+    axes.set_ylim(len(at) - 0.4, -0.6)
+    axes.set_xlabel(one.title)
+    axes.set_xscale("symlog", linthresh=LEAST_RATE)
+    axes.set_xlim(left=-0.2 * LEAST_RATE)
+    figure.legend(loc="outside upper center", ncols=2)
     return figure

@@ -1,8 +1,9 @@
 """Detection: how often the right rotor is named, how soon, and how often a sound one is, with exact intervals.
 
 ``detection.json`` has the false alarms of healthy flights, and for each vehicle, set of sensors, detector and fault
-how many flights named the right rotor, how many none, and after what time; besides, each of these by manoeuvre and by
-strength of gusts, which rotor was named for which, the error of the loss, and points of the ROC.
+how many flights named the right rotor, how many none, and after what time; besides, each of these by manoeuvre, by
+strength of gusts and of vibration, which rotor was named for which, the error of the loss, points of the ROC, and
+the rate of false alarms that was asked for beside the one that was had.
 
 A rate per hour has Garwood's interval: that of a Poisson count, exact.
 """
@@ -10,7 +11,7 @@ A rate per hour has Garwood's interval: that of a Poisson count, exact.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,50 +19,26 @@ from scipy.stats import chi2
 
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.campaigns.study import Study
+from rotorfault.campaigns.summaries.detection_figures import figures, isolation, tables
 from rotorfault.campaigns.summaries.parts import (
+    NAMED,
     Column,
-    Curves,
-    PageTable,
+    Flights,
+    Kind,
     Row,
-    Shares,
     Summary,
     Which,
     columns_of_table,
     counted,
     grouped,
+    milliseconds,
     percent,
     sensors_of,
-    shares,
     told,
 )
 
-BANDS = 3  # of gust intensity, alike in width
-GRADED = ("right rotor", "others too")
-
-
-class _Kind(NamedTuple):
-    """What is said of flights of one scenario."""
-
-    vehicle: str
-    sensors: str
-    detector: str
-    variant: str
-    fault: str
-    manoeuvre: str
-    rotors: int
-
-
-class _Flights(NamedTuple):
-    """Flights of a campaign, one element for each, in the order of the table."""
-
-    kind: list[_Kind]
-    columns: Mapping[str, Column]
-    loss: Column  # 0 in healthy flights
-    level: float
-
-    def some(self, *names: str) -> dict[Any, Which]:
-        """Flights by some of what is said of them."""
-        return grouped([tuple(getattr(one, name) for name in names) for one in self.kind])
+BANDS = 3  # of gusts and vibration, alike in width
+WITHIN = (45, 130, 300, 2000)  # ms: delays by which flights are counted
 
 
 def detection(study: Study, table: pa.Table) -> Summary:
@@ -91,15 +68,15 @@ def detection(study: Study, table: pa.Table) -> Summary:
         "losses_by_manoeuvre": _rows(
             flights, (*by_loss, "manoeuvre"), lambda which: _losses(flights, which), faulty=True
         ),
-        "losses_by_gusts": _by_gusts(flights, by_loss),
+        "losses_by_gusts": _by_bands(flights, by_loss, "gust_intensity", "gusts"),
+        "losses_by_vibration": _by_bands(flights, by_loss, "vibration", "vibration"),
+        "wanted": _wanted(flights),
         "confusion": _confusion(flights),
+        "isolation": isolation(flights, first),
         "roc": _roc(flights),
     }
     return Summary(
-        {"detection.json": content},
-        tuple(_lines(content)),
-        (_loss_table(losses), _alarm_table(alarms)),
-        (*_figures(flights, of_first), *_curves(content["roc"])),
+        {"detection.json": content}, tuple(_lines(content)), tables(content), figures(flights, of_first, content)
     )
 
 
@@ -117,13 +94,16 @@ def garwood(count: int, hours: float, level: float = 0.95) -> tuple[float, float
     return low / hours, float(chi2.ppf(1.0 - tail, 2 * count + 2)) / 2.0 / hours
 
 
-def _flights(study: Study, columns: Mapping[str, Column]) -> _Flights:
+def _flights(study: Study, columns: Mapping[str, Column]) -> Flights:
     count = len(columns["cell"])
-    kinds: list[_Kind | None] = [None] * count
+    kinds: list[Kind | None] = [None] * count
+    vehicles = {}
     for one in told(study, columns):
-        kind = _Kind(
+        vehicles[one.vehicle] = one.scenario.vehicle
+        kind = Kind(
             one.vehicle, sensors_of(one), one.kind("detector", DIAGNOSIS), study.variant[one.variant].label,
             one.labels.get("fault", ""), one.labels.get("manoeuvre", "as given"), len(one.scenario.vehicle.rotor),
+            getattr(one.scenario[DIAGNOSIS].settings, "false_alarms", None),
         )  # fmt: skip
         for k in one.which:
             kinds[k] = kind
@@ -133,10 +113,10 @@ def _flights(study: Study, columns: Mapping[str, Column]) -> _Flights:
     if "loss" in columns:
         pairs = zip(kinds, loss, strict=True)
         kinds = [kind and kind._replace(fault=kind.fault or f"{share:g}") for kind, share in pairs]
-    return _Flights([kind for kind in kinds if kind is not None], columns, loss, study.refine.level)
+    return Flights([kind for kind in kinds if kind is not None], columns, loss, study.refine.level, vehicles)
 
 
-def _rows(flights: _Flights, names: Sequence[str], numbers: Callable[[Which], Row], *, faulty: bool) -> list[Row]:
+def _rows(flights: Flights, names: Sequence[str], numbers: Callable[[Which], Row], *, faulty: bool) -> list[Row]:
     """A row for each different set of what is said of flights, of those with a fault or of the healthy ones."""
     found = []
     for key, which in flights.some(*names).items():
@@ -146,7 +126,7 @@ def _rows(flights: _Flights, names: Sequence[str], numbers: Callable[[Which], Ro
     return found
 
 
-def _alarms(flights: _Flights, which: Which) -> Row:
+def _alarms(flights: Flights, which: Which) -> Row:
     """False alarms of healthy flights."""
     hours = float(flights.columns["end_time"][which].sum()) / 3600.0
     count = int(flights.columns["false_alarms"][which].sum())
@@ -162,10 +142,10 @@ def _alarms(flights: _Flights, which: Which) -> Row:
     }
 
 
-def _losses(flights: _Flights, which: Which) -> Row:
+def _losses(flights: Flights, which: Which) -> Row:
     """What became of faults."""
     grade, delay = flights.columns["grade"][which], flights.columns["delay"][which].astype(float)
-    right = np.isin(grade, GRADED)
+    right = np.isin(grade, NAMED)
     delay = delay[right & np.isfinite(delay)]
     loss, believed = flights.loss[which], flights.columns["loss_believed"][which].astype(float)
     error = np.abs(believed - loss)[right & np.isfinite(believed)]
@@ -184,35 +164,44 @@ def _losses(flights: _Flights, which: Which) -> Row:
         "others_too": int((grade == "others too").sum()),
         "alarm_before": int((grade == "false alarm").sum()),
         "survived": int(flights.columns["survived"][which].astype(bool).sum()),
+        "within": {f"{ms} ms": int((delay <= 1e-3 * ms).sum()) for ms in WITHIN},
         "loss_error_median": float(np.median(error)) if error.size else None,
     }
 
 
-def _by_gusts(flights: _Flights, names: Sequence[str]) -> list[Row]:
-    """Losses by bands of the gusts' intensity, where it is drawn."""
-    if "gust_intensity" not in flights.columns:
+def _by_bands(flights: Flights, names: Sequence[str], column: str, called: str) -> list[Row]:
+    """Losses by bands of a quantity, where it is drawn."""
+    if column not in flights.columns:
         return []
-    gusts = flights.columns["gust_intensity"].astype(float)
-    edges = np.linspace(np.nanmin(gusts), np.nanmax(gusts), BANDS + 1)
+    drawn = flights.columns[column].astype(float)
+    edges = np.linspace(np.nanmin(drawn), np.nanmax(drawn), BANDS + 1)
     if edges[0] == edges[-1]:
         return []
-    band = np.clip(np.searchsorted(edges, gusts, side="right") - 1, 0, BANDS - 1)
+    band = np.clip(np.searchsorted(edges, drawn, side="right") - 1, 0, BANDS - 1)
     found = []
     for k in range(BANDS):
         chosen = np.flatnonzero((band == k) & (flights.loss > 0.0))
+        ends = {f"{called}_from": float(edges[k]), f"{called}_to": float(edges[k + 1])}
         for key, which in grouped([tuple(getattr(flights.kind[i], name) for name in names) for i in chosen]).items():
-            found.append(
-                {
-                    **dict(zip(names, key, strict=True)),
-                    "gusts_from": float(edges[k]),
-                    "gusts_to": float(edges[k + 1]),
-                    **_losses(flights, chosen[which]),
-                }
-            )
+            found.append({**dict(zip(names, key, strict=True)), **ends, **_losses(flights, chosen[which])})
     return found
 
 
-def _confusion(flights: _Flights) -> list[Row]:
+def _wanted(flights: Flights) -> list[Row]:
+    """The rates of false alarms that were asked for beside those that were had, where they can be asked for."""
+    found = []
+    for (detector, variant, wanted), which in flights.some("detector", "variant", "wanted").items():
+        healthy = which[flights.loss[which] == 0.0]
+        if wanted is not None and healthy.size:
+            row = _alarms(flights, healthy)
+            within = row["high"] is not None and row["low"] <= wanted <= row["high"]
+            below = row["high"] is not None and row["high"] < wanted
+            said = "no more" if below else "within the interval" if within else "more"
+            found.append({"detector": detector, "variant": variant, "wanted": wanted, "so": said, **row})
+    return found
+
+
+def _confusion(flights: Flights) -> list[Row]:
     """Which rotor was named first for which, by vehicle and detector; 0 where none was."""
     found = []
     for (vehicle, sensors, variant, rotors), which in flights.some("vehicle", "sensors", "variant", "rotors").items():
@@ -228,7 +217,7 @@ def _confusion(flights: _Flights) -> list[Row]:
     return found
 
 
-def _roc(flights: _Flights) -> list[Row]:
+def _roc(flights: Flights) -> list[Row]:
     """A point for each variant and fault: false alarms per hour, and share of faults whose rotor was named."""
     found = []
     for (detector, variant), which in flights.some("detector", "variant").items():
@@ -253,79 +242,9 @@ def _lines(content: Row) -> list[str]:
     lines.append("right rotor, missed, delay (median, 95 %)")
     for row in content["losses"]:
         right, missed = percent(row["right_rotor"], row["flights"]), percent(row["missed"], row["flights"])
-        lines.append(f"  {_who(row)}, {row['fault']}  {right}  {missed}  {_ms(row)}  of {row['flights']}")
+        lines.append(f"  {_who(row)}, {row['fault']}  {right}  {missed}  {milliseconds(row)}  of {row['flights']}")
     return lines
 
 
 def _who(row: Row) -> str:
     return f"{row['vehicle']}, {row['sensors']}, {row['variant']}"
-
-
-def _ms(row: Row) -> str:
-    if row["median_delay_ms"] is None:
-        return "–"
-    return f"{row['median_delay_ms']:.0f}, {row['p95_delay_ms']:.0f} ms"
-
-
-def _loss_table(rows: list[Row]) -> PageTable:
-    return PageTable(
-        "Faults found",
-        "Right rotor: flagged first after the onset; others too: then another as well. Delays are of those found. "
-        "Error: of the believed loss, 0.15 s after the onset, median. Brackets: intervals by Clopper and Pearson.",
-        ("vehicle", "sensors", "detector", "fault", "right rotor", "others too", "wrong rotor", "missed",
-         "alarm before", "delay: median, 95 %", "error of loss"),
-        tuple(
-            (
-                row["vehicle"], row["sensors"], row["variant"], row["fault"],
-                f"{row['right_rotor']} of {row['flights']} ({100 * row['right_low']:.1f} to "
-                f"{100 * row['right_high']:.1f} %)",
-                *(str(row[name]) for name in ("others_too", "wrong_rotor", "missed", "alarm_before")), _ms(row),
-                "–" if row["loss_error_median"] is None else f"{row['loss_error_median']:.3f}",
-            )
-            for row in rows
-        ),
-    )  # fmt: skip
-
-
-def _alarm_table(rows: list[Row]) -> PageTable:
-    return PageTable(
-        "False alarms",
-        "Flags that rise in healthy flights, per hour of flight; brackets: Garwood's interval of a Poisson count.",
-        ("vehicle", "sensors", "detector", "hours", "alarms", "per hour", "flights lost"),
-        tuple(
-            (
-                row["vehicle"], row["sensors"], row["variant"], f"{row['hours']:.3g}", str(row["count"]),
-                "–" if row["per_hour"] is None else f"{row['per_hour']:.3g} ({row['low']:.3g} to {row['high']:.3g})",
-                f"{row['lost']} of {row['flights']}",
-            )
-            for row in rows
-        ),
-    )  # fmt: skip
-
-
-def _figures(flights: _Flights, of_first: Column) -> list[Shares]:
-    """Share of right rotors by fault and manoeuvre, a panel for each vehicle."""
-    chosen = np.flatnonzero(of_first & (flights.loss > 0.0))
-    if not chosen.size:
-        return []
-    kinds = [flights.kind[k] for k in chosen]
-    keys = ([one.vehicle for one in kinds], [one.manoeuvre for one in kinds], [one.fault for one in kinds])
-    good = np.isin(flights.columns["grade"][chosen], GRADED)
-    return [
-        shares("right-rotor", f"share in which the right rotor is named, {kinds[0].variant}", "fault", keys, good)
-    ]
-
-
-def _curves(roc: list[Row]) -> list[Curves]:
-    """Share of right rotors over false alarms, a line for each fault through the variants."""
-    if len({row["variant"] for row in roc}) < 2:
-        return []
-    lines = {}
-    for fault in dict.fromkeys(row["fault"] for row in roc):
-        rows = [row for row in roc if row["fault"] == fault and row["per_hour"] is not None]
-        points = np.array([[row[name] for name in ("per_hour", "right", "low", "high")] for row in rows]).reshape(
-            -1, 4
-        )
-        x, y, low, high = points[np.argsort(points[:, 0], kind="stable")].T
-        lines[fault] = (x, y, low, high)
-    return [Curves("roc", "false alarms per hour", "share of right rotors (–)", lines, True)]

@@ -17,6 +17,7 @@ from rotorfault.base.files import write_durably
 from rotorfault.campaigns.flight_set import FlightSet, alike
 from rotorfault.campaigns.sampling.statistics import Array, clopper_pearson
 from rotorfault.campaigns.study import Cases, Study
+from rotorfault.model.vehicle_file import VehicleFile
 from rotorfault.plant.sensors import SENSORS
 from rotorfault.scenario.scenario import Scenario
 
@@ -56,13 +57,56 @@ class Curves(NamedTuple):
     x_log: bool
 
 
+class Rates(NamedTuple):
+    """A figure of rates per hour with intervals, one under the other, beside those that were asked for."""
+
+    name: str  # of the file
+    title: str  # of the axis
+    labels: tuple[str, ...]
+    rate: Array  # per hour
+    low: Array
+    high: Array
+    wanted: Array  # per hour, NaN where none was asked for
+
+
+class Kind(NamedTuple):
+    """What is said of flights of one scenario that judge a detector."""
+
+    vehicle: str
+    sensors: str
+    detector: str
+    variant: str
+    fault: str
+    manoeuvre: str
+    rotors: int
+    wanted: float | None  # false alarms per hour, where a detector is asked for them
+
+
+class Flights(NamedTuple):
+    """Flights of a campaign that judges detectors, one element for each, in the order of the table."""
+
+    kind: list[Kind]
+    columns: Mapping[str, Column]
+    loss: Column  # 0 in healthy flights
+    level: float
+    vehicles: Mapping[str, VehicleFile]
+
+    def some(self, *names: str) -> dict[Any, Which]:
+        """Flights by some of what is said of them."""
+        return grouped([tuple(getattr(one, name) for name in names) for one in self.kind])
+
+
+NAMED = ("right rotor", "others too")
+"""Grades of flights in which the right rotor was named first."""
+
+
 class Summary(NamedTuple):
     """What a campaign writes at its end."""
 
     files: dict[str, Any]  # JSON, by name
     lines: tuple[str, ...]  # for the terminal
     tables: tuple[PageTable, ...]
-    figures: tuple[Shares | Curves, ...]
+    figures: tuple[Shares | Curves | Rates, ...]
 
     def write(self, folder: Path) -> list[Path]:
         """Write the files into the campaign's folder; their paths."""
@@ -191,3 +235,10 @@ def diagnosis_of(one: Told) -> str:
 def joined(words: Iterable[object]) -> str:
     """Words with commas."""
     return ", ".join(map(str, words))
+
+
+def milliseconds(row: Row) -> str:
+    """Delays of a row in words, median and 95 %."""
+    if row["median_delay_ms"] is None:
+        return "–"
+    return f"{row['median_delay_ms']:.0f}, {row['p95_delay_ms']:.0f} ms"

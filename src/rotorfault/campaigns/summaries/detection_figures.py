@@ -1,0 +1,279 @@
+"""Tables and figures of a campaign that judges detectors, and what its isolation of rotors was predicted to be.
+
+Predicted is what `rotorfault.analysis.signatures.told_apart` says of hover, for the observer and the noise of the
+sensors ``noisy``: a rotor is named for the losses from which it is told apart 99 times in 100, and none below.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rotorfault.analysis.signatures import told_apart
+from rotorfault.campaigns.summaries.parts import (
+    NAMED,
+    Column,
+    Curves,
+    Flights,
+    PageTable,
+    Rates,
+    Row,
+    Shares,
+    Which,
+    counted,
+    grouped,
+    milliseconds,
+    shares,
+)
+
+DELAYS = (8, 16, 32, 45, 64, 90, 130, 180, 300, 500, 1000, 2000)  # ms: points of the delays' distribution
+NO_ROTOR = "none"
+AFTER = 0.1  # s: a rotor that is named by then has a loss that is estimated when it is read
+
+
+def isolation(flights: Flights, variant: str) -> list[Row]:
+    """For each rotor of each vehicle, what it was predicted to be taken for, and what it was taken for.
+
+    Parameters
+    ----------
+    flights : Flights
+    variant : str
+        Label of the detector whose flights are counted.
+
+    Returns
+    -------
+    list of dict
+        ``vehicle``, ``rotor``, ``most_alike`` (rotor), ``angle`` [rad], ``least_loss`` from which it is predicted to
+        be told apart; ``predicted`` and ``measured``: shares of its faults for which none, rotor 1, rotor 2 and so on
+        were to be named and were; ``flights``.
+    """
+    found = []
+    for (vehicle, rotors), which in flights.some("vehicle", "rotors").items():
+        mine = np.array([flights.kind[k].variant == variant for k in which]) & (flights.loss[which] > 0.0)
+        struck, first = (flights.columns[name][which][mine].astype(int) for name in ("struck", "flagged_first"))
+        loss = flights.loss[which][mine]
+        for told in told_apart(flights.vehicles[vehicle]).singles:
+            own = struck == told.rotor
+            if own.any():
+                named = np.where(loss[own] >= told.least_loss, told.rotor, 0)
+                found.append(
+                    {"vehicle": vehicle, "rotor": told.rotor, "most_alike": told.like, "angle": told.angle,
+                     "least_loss": told.least_loss if np.isfinite(told.least_loss) else None,
+                     "predicted": _counts(named, rotors), "measured": _counts(first[own], rotors),
+                     "flights": int(own.sum())}
+                )  # fmt: skip
+    return found
+
+
+def _counts(named: Column, rotors: int) -> list[float]:
+    return [float(share) for share in np.bincount(named, minlength=rotors + 1) / max(len(named), 1)]
+
+
+def tables(content: Row) -> tuple[PageTable, ...]:
+    """Tables of the page.
+
+    Parameters
+    ----------
+    content : dict
+        Of ``detection.json``.
+    """
+    wanted = (_wanted_table(content["wanted"]),) if len(content["wanted"]) > 1 else ()
+    apart = (_isolation_table(content["isolation"]),) if content["isolation"] else ()
+    return (_loss_table(content["losses"]), _alarm_table(content["false_alarms_by"]), *wanted, *apart)
+
+
+def figures(flights: Flights, of_first: Column, content: Row) -> tuple[Shares | Curves | Rates, ...]:
+    """Figures of the page.
+
+    Parameters
+    ----------
+    flights : Flights
+    of_first : ndarray of bool, shape (N,)
+        Which flights are of the first detector.
+    content : dict
+        Of ``detection.json``.
+    """
+    chosen = np.flatnonzero(of_first & (flights.loss > 0.0))
+    return (
+        *(_by_manoeuvre(flights, chosen) if chosen.size else ()),
+        *((_delays(flights, chosen),) if chosen.size else ()),
+        *_errors(flights, chosen),
+        *_confusions(content["isolation"], flights, of_first),
+        *_rates(content),
+        *_roc(content["roc"]),
+    )
+
+
+def _loss_table(rows: list[Row]) -> PageTable:
+    return PageTable(
+        "Faults found",
+        "Right rotor: flagged first after the onset; others too: then another as well. Delays are of those found. "
+        "Error: of the believed loss, 0.15 s after the onset, median. Brackets: intervals by Clopper and Pearson.",
+        ("vehicle", "sensors", "detector", "fault", "right rotor", "others too", "wrong rotor", "missed",
+         "alarm before", "delay: median, 95 %", "error of loss"),
+        tuple(
+            (
+                row["vehicle"], row["sensors"], row["variant"], row["fault"],
+                f"{row['right_rotor']} of {row['flights']} ({100 * row['right_low']:.1f} to "
+                f"{100 * row['right_high']:.1f} %)",
+                *(str(row[name]) for name in ("others_too", "wrong_rotor", "missed", "alarm_before")),
+                milliseconds(row), "–" if row["loss_error_median"] is None else f"{row['loss_error_median']:.3f}",
+            )
+            for row in rows
+        ),
+    )  # fmt: skip
+
+
+def _per_hour(row: Row) -> str:
+    return "–" if row["per_hour"] is None else f"{row['per_hour']:.3g} ({row['low']:.3g} to {row['high']:.3g})"
+
+
+def _alarm_table(rows: list[Row]) -> PageTable:
+    return PageTable(
+        "False alarms",
+        "Flags that rise in healthy flights, per hour of flight; brackets: Garwood's interval of a Poisson count.",
+        ("vehicle", "sensors", "detector", "hours", "alarms", "per hour", "flights lost"),
+        tuple(
+            (row["vehicle"], row["sensors"], row["variant"], f"{row['hours']:.3g}", str(row["count"]),
+             _per_hour(row), f"{row['lost']} of {row['flights']}")
+            for row in rows
+        ),
+    )  # fmt: skip
+
+
+def _wanted_table(rows: list[Row]) -> PageTable:
+    return PageTable(
+        "False alarms wanted and had",
+        "Per hour of healthy flight of all vehicles; brackets: Garwood's interval. No more: all of it is below.",
+        ("detector", "wanted", "had", "alarms", "hours", "so"),
+        tuple(
+            (
+                row["variant"],
+                f"{row['wanted']:g}",
+                _per_hour(row),
+                str(row["count"]),
+                f"{row['hours']:.3g}",
+                row["so"],
+            )
+            for row in rows
+        ),
+    )
+
+
+def _isolation_table(rows: list[Row]) -> PageTable:
+    def worst(row: Row) -> str:
+        wrong = [0.0 if k in (0, row["rotor"]) else share for k, share in enumerate(row["measured"])]
+        most = int(np.argmax(wrong))
+        return f"{most} in {100 * wrong[most]:.1f} %" if wrong[most] else "none"
+
+    def least(row: Row) -> str:
+        return "never" if row["least_loss"] is None or row["least_loss"] > 1.0 else f"{100 * row['least_loss']:.0f} %"
+
+    return PageTable(
+        "Which rotor for which",
+        "Predicted from the model, in hover and without wind, for the observer (rf.told_apart): the rotor whose loss "
+        "looks most alike, the angle between both, and the loss from which both are told apart.",
+        ("vehicle", "rotor", "most alike", "angle", "told apart from", "named right", "most often wrong", "flights"),
+        tuple(
+            (row["vehicle"], str(row["rotor"]), str(row["most_alike"]), f"{np.degrees(row['angle']):.0f}°",
+             least(row), f"{100 * row['measured'][row['rotor']]:.1f} %", worst(row), str(row["flights"]))
+            for row in rows
+        ),
+    )  # fmt: skip
+
+
+def _by_manoeuvre(flights: Flights, chosen: Which) -> list[Shares]:
+    """Share of right rotors by fault and manoeuvre, a panel for each vehicle and set of sensors."""
+    if not chosen.size:
+        return []
+    kinds = [flights.kind[k] for k in chosen]
+    panels = [f"{one.vehicle}, {one.sensors}" for one in kinds]
+    keys = (panels, [one.manoeuvre for one in kinds], [one.fault for one in kinds])
+    good = np.isin(flights.columns["grade"][chosen], NAMED)
+    return [
+        shares("right-rotor", f"share in which the right rotor is named, {kinds[0].variant}", "fault", keys, good)
+    ]
+
+
+def _delays(flights: Flights, chosen: Which) -> Curves:
+    """Share of faults whose rotor is named by a time, a line for each fault."""
+    lines = {}
+    points = np.array(DELAYS, dtype=float)
+    for (fault,), part in grouped([(flights.kind[k].fault,) for k in chosen]).items():
+        which = chosen[part]
+        right = np.isin(flights.columns["grade"][which], NAMED)
+        delay = np.where(right, flights.columns["delay"][which].astype(float), np.inf)
+        counts = [int((delay <= 1e-3 * point).sum()) for point in points]
+        ends = np.array([counted(count, int(which.size), flights.level) for count in counts])
+        lines[fault] = (points, np.array(counts) / which.size, ends[:, 0], ends[:, 1])
+    return Curves("delays", "time since the onset (ms)", "share of right rotors by then (–)", lines, True)
+
+
+def _errors(flights: Flights, chosen: Which) -> list[Curves]:
+    """Believed over true loss of those found, a line for each vehicle: median, and where 90 % of them are."""
+    lines = {}
+    kinds = [(flights.kind[k].vehicle, flights.kind[k].sensors) for k in chosen]
+    believed = flights.columns["loss_believed"].astype(float)
+    sudden = flights.columns["ramp"].astype(float) == 0.0 if "ramp" in flights.columns else flights.loss > 0.0
+    found = np.isin(flights.columns["grade"], NAMED) & np.isfinite(believed) & sudden
+    found &= np.nan_to_num(flights.columns["delay"].astype(float), nan=np.inf) < AFTER
+    for name, part in grouped(kinds).items():
+        which = chosen[part][found[chosen[part]]]
+        losses = np.unique(flights.loss[which])
+        if losses.size > 1:
+            ends = [np.quantile(believed[which][flights.loss[which] == loss], (0.5, 0.05, 0.95)) for loss in losses]
+            middle, low, high = np.array(ends).T
+            lines[", ".join(name)] = (losses, middle, low, high)
+    if not lines:
+        return []
+    true = np.unique(np.concatenate([losses for losses, *_ in lines.values()]))
+    lines["if it were right"] = (true, true, true, true)
+    return [Curves("loss-error", "true loss (–)", "believed 0.15 s after the onset (–)", lines, False)]
+
+
+def _confusions(rows: list[Row], flights: Flights, of_first: Column) -> list[Shares]:
+    """Rotor at fault over rotor that is named, predicted beside measured, a figure for each vehicle."""
+    first = next((one.variant for one, mine in zip(flights.kind, of_first, strict=True) if mine), "")
+    figures = []
+    for (vehicle,), which in grouped([(row["vehicle"],) for row in rows]).items():
+        mine = [rows[k] for k in which]
+        share = np.array([[row[name] for row in mine] for name in ("predicted", "measured")])
+        names = (NO_ROTOR, *(str(k) for k in range(1, share.shape[2])))
+        figures.append(
+            Shares(f"confusion-{vehicle}", f"{vehicle}: rotor at fault (rows) by the one that is named",
+                   ("predicted in hover", f"measured, {first}"), tuple(str(row["rotor"]) for row in mine), names,
+                   "rotor named", share)
+        )  # fmt: skip
+    return figures
+
+
+def _rates(content: Row) -> list[Rates]:
+    """False alarms per hour: by vehicle and detector, and beside what was wanted."""
+
+    def made(name: str, rows: list[Row], labels: list[str], wanted: list[Any]) -> Rates:
+        rate, low, high = (np.array([row[key] for row in rows], dtype=float) for key in ("per_hour", "low", "high"))
+        asked = np.array([np.nan if one is None else one for one in wanted], dtype=float)
+        return Rates(name, "false alarms per hour of healthy flight", tuple(labels), rate, low, high, asked)
+
+    rows = [row for row in content["false_alarms_by"] if row["high"] is not None]
+    rows.sort(key=lambda row: (row["vehicle"], row["sensors"]))
+    asked = {row["variant"]: row["wanted"] for row in content["wanted"]}
+    labels = [f"{row['vehicle']}, {row['sensors']}: {row['variant']}" for row in rows]
+    found = [made("false-alarms", rows, labels, [asked.get(row["variant"]) for row in rows])] if rows else []
+    wanted = [row for row in content["wanted"] if row["high"] is not None]
+    if len(wanted) > 1:
+        found.append(made("wanted", wanted, [row["variant"] for row in wanted], [row["wanted"] for row in wanted]))
+    return found
+
+
+def _roc(roc: list[Row]) -> list[Curves]:
+    """Share of right rotors over false alarms, a line for each detector and fault through its thresholds."""
+    lines = {}
+    for (detector, fault), which in grouped([(row["detector"], row["fault"]) for row in roc]).items():
+        rows = [roc[k] for k in which if roc[k]["per_hour"] is not None]
+        if len(rows) > 1:
+            points = np.array([[row[name] for name in ("per_hour", "right", "low", "high")] for row in rows])
+            x, y, low, high = points[np.argsort(points[:, 0], kind="stable")].T
+            lines[f"{detector}, {fault}"] = (x, y, low, high)
+    return [Curves("roc", "false alarms per hour", "share of right rotors (–)", lines, True)] if lines else []
