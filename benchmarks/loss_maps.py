@@ -23,11 +23,11 @@ LAWS = {"kept upright": "upright", "spinning": "relaxed"}
 
 
 def cases() -> dict[str, dict[str, Any]]:
-    """Settings of each vehicle: those of the study of total losses, less its faults."""
+    """Settings of each vehicle: those of its first case in the study of total losses, less its faults."""
     (lost,) = (part for part in load_study("total-loss").axis if part.name == "lost")
     return {
         str(case.settings["vehicle"]): {key: value for key, value in case.settings.items() if key != "fault"}
-        for case in lost.case
+        for case in reversed(lost.case)
     }
 
 
