@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from rotorfault.base.files import alone_in, read_plain, write_atomically, write_durably
+from rotorfault.base.errors import InputError
+from rotorfault.base.files import alone_in, in_folder, read_plain, write_atomically, write_durably
 
 
 def test_a_link_is_replaced_and_what_it_leads_to_stays(tmp_path: Path) -> None:
@@ -102,3 +103,9 @@ def test_files_that_belong_together_are_of_one_writer(tmp_path: Path) -> None:
             mixed += len(texts) > 1
     assert not mixed
     assert [end.recv() for end in ends] == ["done", "done"]
+
+
+def test_a_folder_in_place_of_a_file_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    assert in_folder(tmp_path / "new.json") == tmp_path / "new.json"
+    with pytest.raises(InputError, match="is a folder; give another file"):
+        in_folder(tmp_path)

@@ -174,6 +174,7 @@ USAGE = [
     ("convert position 1 2 3 --from ned", "--to is missing: One of those that --from takes; see"),
     ("convert position --from px4 --to ned", "position: no values came; give 3 after it (x, y, z), as in"),
     ("fly --seed", "--seed needs a value after it; see 'rotorfault fly --help'"),
+    ("new vehicle mine --from a.ulg", "--from needs 2 values after it; see 'rotorfault new --help'"),
     ("fly --no-figuers", "unknown option '--no-figuers'; did you mean '--no-figures'? (allowed: --controller,"),
     ("fli", "unknown command 'fli'; did you mean 'fly'? (allowed: animate,"),
     ("trim paper hummingbird", "'hummingbird' is too much (allowed: VEHICLE); see 'rotorfault trim --help'"),

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from made_up_logs import LOG_WRITERS, flown
 
+from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.base.errors import InputError
 from rotorfault.logs import stream
+from rotorfault.logs.diagnose import diagnosis_of
+from rotorfault.logs.page import page_name
 from rotorfault.logs.read import read_log
 
 PACKED = [name for name in LOG_WRITERS if not name.endswith(".npz")]
@@ -75,3 +78,15 @@ def test_what_is_packed_already_is_to_be_unpacked(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(b"\x89HDF\r\n\x1a\n" + bytes(100)))
     with pytest.raises(InputError, match="unpack it and give that"):
         read_log(path)
+
+
+def test_the_page_of_a_gzipped_log_has_the_name_of_the_log(tmp_path: Path) -> None:
+    plain = LOG_WRITERS["a.csv"](flown(seed=2, seconds=4.0), tmp_path / "a.csv").read_bytes()
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(plain))
+    assert page_name(diagnosis_of(read_log(tmp_path / "a.csv.gz"))) == "a.html"
+
+
+def test_only_sources_that_look_are_run_over_a_log() -> None:
+    looking = {name for name in DIAGNOSIS.registry if DIAGNOSIS.registry[name].looks}
+    assert {"glr", "luenberger"} <= looking
+    assert not looking & {"injected", "delayed"}

@@ -107,15 +107,17 @@ def _sync_folder(folder: Path) -> None:
 
 
 def in_folder(path: Path) -> Path:
-    """The same path, if the folder that it lies in exists.
+    """The same path of a file to be written, if the folder that it lies in exists.
 
     Raises
     ------
     InputError
-        If it does not.
+        If it does not, or the path is a folder itself.
     """
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}; make it first")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; give another file")
     return path
 
 

@@ -37,7 +37,8 @@ def refusal(error: Any, given: Sequence[str]) -> str:
     if kind == "MissingParameter" and parameter is not None:
         return f"{name} is missing: {parameter.help.rstrip('.')}; {mend}"
     if kind == "BadOptionUsage":
-        return f"{error.option_name} needs a value after it; {mend}"
+        count = "".join(filter(str.isdigit, text.rpartition("requires")[2]))  # the parser gives no option with it
+        return f"{error.option_name} needs {f'{count} values' if count else 'a value'} after it; {mend}"
     if kind == "BadParameter" and parameter is not None:
         return f"{name}: got {short(_value(parameter, given))}; allowed: {_allowed(parameter, text)}"
     if "extra argument" in text:

@@ -16,10 +16,10 @@ import numpy as np
 from rotorfault.logs.baseline import Baseline, hover_command, trim_of
 from rotorfault.logs.detectors import Said, said_by_all
 from rotorfault.logs.dynamics import Residual, Response, block_length, residual_of
-from rotorfault.logs.log import Log
+from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
-from rotorfault.logs.sentences import own_words, sudden_evidence, trim_evidence, verdict_of, when
+from rotorfault.logs.sentences import own_words, sudden_evidence, trim_evidence, verdict_of
 from rotorfault.logs.trim import PRIOR, Evidence, Trim, directions_of, spread_of, weigh
 from rotorfault.logs.verdict import Cause, LogDiagnosis
 

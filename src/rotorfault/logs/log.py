@@ -170,3 +170,15 @@ def cleaned(series: Series) -> Series:
         ahead = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
         time, values = time[ahead], values[ahead]
     return Series(time, values)
+
+
+def when(log: Log, time: float) -> str:
+    """A time of the log's clock, and where in the log it is.
+
+    Parameters
+    ----------
+    log : Log
+    time : float, s
+    """
+    into = time - log.start
+    return f"t = {time:.2f} s" + (f" ({into:.2f} s into the log)" if log.start > 0.5 else "")

@@ -16,7 +16,7 @@ from rotorfault.base.files import output_folder
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import SUDDEN
 from rotorfault.logs.scan import Scan
-from rotorfault.logs.sentences import rotor_words
+from rotorfault.logs.sentences import percent, rotor_words
 from rotorfault.logs.verdict import LogDiagnosis, likely
 from rotorfault.maths.arrays import ANGLES, AXES, Array
 from rotorfault.maths.geometry import Vec3
@@ -46,7 +46,9 @@ def page_name(found: LogDiagnosis) -> str:
     ----------
     found : LogDiagnosis
     """
-    stem = "".join(c if c.isalnum() or c in "-_." else "-" for c in Path(found.log.source).stem)[:80]
+    stem = "".join(c if c.isalnum() or c in "-_." else "-" for c in Path(found.log.source.removesuffix(".gz")).stem)[
+        :80
+    ]
     return f"{stem or 'log'}.html"
 
 
@@ -83,7 +85,7 @@ def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None,
     zero = found.log.start if begin is None else begin
     data = data_of(found, file, begin)
     rows = [
-        (f"{one.probability:.0%} {one.cause}" + (f", rotor {one.rotor}" if one.rotor else ""), one.evidence)
+        (f"{percent(one.probability)} {one.cause}" + (f", rotor {one.rotor}" if one.rotor else ""), one.evidence)
         for one in found.causes
         if one.probability >= 0.005
     ]
@@ -102,7 +104,7 @@ def _facts(found: LogDiagnosis) -> list[Fact]:
     what = rotor_words(found.log, first.rotor) if first.rotor is not None else what
     if "cannot tell" in found.verdict:
         what, look = "cannot tell", "fair"
-    facts = [Fact(what, f"{likely(first.probability)}, {first.probability:.0%}", found.verdict, look)]
+    facts = [Fact(what, f"{likely(first.probability)}, {percent(first.probability)}", found.verdict, look)]
     if first.rotor is not None and first.loss is not None:
         facts.append(Fact(f"{first.loss:.0%}", "of its thrust lost", "as the log shows it", look))
     if first.rotor is not None and first.onset is not None:

@@ -6,22 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotorfault.logs.log import Log
+from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence, Trim
 from rotorfault.logs.verdict import Cause, likely
-
-
-def when(log: Log, time: float) -> str:
-    """A time of the log's clock, and where in the log it is.
-
-    Parameters
-    ----------
-    log : Log
-    time : float, s
-    """
-    into = time - log.start
-    return f"t = {time:.2f} s" + (f" ({into:.2f} s into the log)" if log.start > 0.5 else "")
 
 
 def rotor_words(log: Log, rotor: int) -> str:
@@ -121,12 +109,12 @@ def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> 
         Of hover.
     """
     first = causes[0]
-    how = f"({likely(first.probability)}, {_percent(first.probability)})"
+    how = f"({likely(first.probability)}, {percent(first.probability)})"
     if first.cause == "healthy":
         said = f"no rotor is at fault {how}"
         second = next((one for one in causes[1:] if one.rotor is not None), None)
         if second is not None and second.probability >= 0.02:
-            said += f"; {rotor_words(log, second.rotor or 1)} cannot be excluded ({_percent(second.probability)})"
+            said += f"; {rotor_words(log, second.rotor or 1)} cannot be excluded ({percent(second.probability)})"
         return said
     if first.rotor is None:
         word = (
@@ -154,9 +142,15 @@ def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> str:
     for one in doubts:
         name = rotor_words(log, one.rotor) if one.rotor is not None else one.cause
         name = "a sound vehicle" if name == "healthy" else name
-        said += f"; {name} cannot be excluded ({_percent(one.probability)})"
+        said += f"; {name} cannot be excluded ({percent(one.probability)})"
     return said
 
 
-def _percent(probability: float) -> str:
+def percent(probability: float) -> str:
+    """A probability in words that do not say that anything is sure.
+
+    Parameters
+    ----------
+    probability : float
+    """
     return "> 99 %" if probability > 0.99 else f"{100.0 * probability:.0f} %"

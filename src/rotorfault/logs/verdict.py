@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, final
 
 from rotorfault.base.text_table import table_lines, terminal_width
 from rotorfault.logs.detectors import Said
-from rotorfault.logs.log import Log
+from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence
 
@@ -133,7 +133,7 @@ class LogDiagnosis:
         lines += table_lines(table, "><<", indent=2, rule=True, most=terminal_width())
         for title, items in (
             ("its own messages", self.own),
-            ("registered sources of diagnosis", tuple(map(_said, self.detectors))),
+            ("registered sources of diagnosis", tuple(_said(one, self.log) for one in self.detectors)),
              ("cannot tell", self.limits), ("read", self._read()),
         ):  # fmt: skip
             if items:
@@ -146,9 +146,9 @@ class LogDiagnosis:
         return (*self.log.remarks, *lost)
 
 
-def _said(one: Said) -> str:
+def _said(one: Said, log: Log) -> str:
     """What a source says, in a line."""
-    flags = ", ".join(f"rotor {rotor} from t = {time:.2f} s" for rotor, time, _ in one.flags) or "nobody"
+    flags = ", ".join(f"rotor {rotor} from {when(log, time)}" for rotor, time, _ in one.flags) or "nobody"
     return f"{one.detector}: {one.note}" if one.note and not one.flags else f"{one.detector} flags {flags}"
 
 

@@ -89,6 +89,7 @@ def page(flights: Sequence[Shown]) -> str:
         flights=[{"label": flight.label, "facts": _headline(flight)} for flight in flights],
         records=[_provenance(flight) for flight in flights],
         spins=any(flight["spins"] for flight in payload["flights"]),
+        rotors=any(flight["vehicle"] is not None for flight in payload["flights"]),
         thinned=_thinned(payload),
         data=script_data(payload),
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),

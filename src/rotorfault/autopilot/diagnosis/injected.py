@@ -7,7 +7,7 @@ belief is survived less often than acting on none.
 
 from __future__ import annotations
 
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 from pydantic import Field
 
@@ -53,6 +53,7 @@ class InjectedMemory(NamedTuple):
 class Injected(Diagnoser[InjectedMemory, InjectedParameters]):
     """A belief that is made up, right or wrong."""
 
+    looks: ClassVar[bool] = False
     Settings = InjectedSettings
 
     def parameters(self, context: Context) -> InjectedParameters:

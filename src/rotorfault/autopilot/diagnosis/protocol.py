@@ -6,7 +6,7 @@ closed loop; it serves studies of what a diagnosis can be worth.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from rotorfault.autopilot.instant import Instant
 from rotorfault.autopilot.prediction import Expectation
@@ -33,11 +33,21 @@ class DiagnosisInputs(NamedTuple):
 
 
 class Diagnoser(Block[DiagnosisInputs, Diagnosis, MemoryT, ParametersT]):
-    """Turns estimates into a belief about the rotors."""
+    """Turns estimates into a belief about the rotors.
+
+    Attributes
+    ----------
+    looks : bool
+        Whether it finds its belief in what it is given; what is told the truth, or made up, does not.
+    """
+
+    looks: ClassVar[bool] = True
 
 
 class Oracle(Diagnoser[MemoryT, ParametersT]):
     """A source that is told the truth: the closed loop calls `told` in place of `step`."""
+
+    looks: ClassVar[bool] = False
 
     def age(self, parameters: ParametersT) -> Scalar:
         """How old the truth is that it wants, in s."""
