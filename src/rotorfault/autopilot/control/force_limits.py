@@ -72,3 +72,17 @@ def full_thrust(vehicle: Vehicle) -> Scalar:
     """Thrust in N of all rotors, sound and at their largest."""
     most = greatest_thrust(vehicle)
     return most.sum() if isinstance(most, PerRotor) else most * vehicle.rotors
+
+
+def direction_of(force_W: Vec3) -> Vec3:
+    """The unit vector along a specific force in m/s^2; upwards where there is none, as without any living rotor.
+
+    Parameters
+    ----------
+    force_W : Vec3, m/s^2
+        In the world or in any other frame whose z axis is up.
+    """
+    # Lost in rounding beside any force there is.
+    some = Vec3(force_W.x, force_W.y, force_W.z + 1e-100)
+    unit: Vec3 = some / sqrt(some.dot(some))
+    return unit

@@ -35,7 +35,7 @@ from pydantic import Field
 from rotorfault.autopilot.allocation.protocol import AllocationInputs
 from rotorfault.autopilot.allocation.sequential import Airmode, Sequential
 from rotorfault.autopilot.control.attitude import settling
-from rotorfault.autopilot.control.force_limits import full_thrust, limited_force
+from rotorfault.autopilot.control.force_limits import direction_of, full_thrust, limited_force
 from rotorfault.autopilot.control.outer_loop import upward_thrust
 from rotorfault.autopilot.control.primary_axis import turn_to
 from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput, Search
@@ -269,7 +269,7 @@ def attitude_rates(q_WB: Quat, force_W: Vec3, yaw: Scalar, gain: Vec3, yaw_weigh
     yaw_weight : scalar
         Share of the heading, 0 to 1.
     """
-    up_W = force_W / sqrt(force_W.dot(force_W))
+    up_W = direction_of(force_W)
     # The whole attitude: from level, turned by yaw, the shortest way to the wanted axis.
     whole = _shortest(Vec3(0.0, 0.0, 1.0), up_W) @ Quat.about_z(yaw)
     # With the thrust axis alone put right the shortest way, what is left of it is a turn about that axis.

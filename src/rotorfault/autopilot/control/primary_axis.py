@@ -23,6 +23,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from rotorfault.autopilot.allocation.available import HOVER_RESERVE, thrusts_in_balance
+from rotorfault.autopilot.control.force_limits import direction_of
 from rotorfault.autopilot.control.protocol import ControlInputs
 from rotorfault.autopilot.control.relaxed import attainable, yaw_given_up
 from rotorfault.base.config import Strict
@@ -105,7 +106,7 @@ def heading_error(inputs: ControlInputs) -> Scalar:
 
 def direction_in_body(force_W: Vec3, R_WB: Mat3) -> Vec3:
     """The unit vector along a specific force, in body coordinates."""
-    d: Vec3 = R_WB.T @ (force_W / sqrt(force_W.dot(force_W)))
+    d: Vec3 = R_WB.T @ direction_of(force_W)
     return d
 
 
