@@ -20,7 +20,14 @@ pytestmark = needs_simd  # long flights; that engines agree is tested elsewhere
 
 EVIL = "<b>&[red]x[/red]"
 SHORT = {"duration": 0.3}
-LOST = {"duration": 2.0, "fault.0.loss": 1.0, "fault.0.time": 0.1, "start.position": [0.0, 0.0, 1.0], "name": EVIL}
+LOST = {
+    "diagnosis": "off",
+    "duration": 2.0,
+    "fault.0.loss": 1.0,
+    "fault.0.time": 0.1,
+    "start.position": [0.0, 0.0, 1.0],
+    "name": EVIL,
+}
 
 
 @pytest.fixture(scope="module")

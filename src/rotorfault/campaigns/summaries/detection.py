@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.campaigns.study import Study
@@ -90,8 +90,8 @@ def garwood(count: int, hours: float, level: float = 0.95) -> tuple[float, float
     level : float
     """
     tail = 0.5 * (1.0 - level)
-    low = float(chi2.ppf(tail, 2 * count)) / 2.0 if count else 0.0
-    return low / hours, float(chi2.ppf(1.0 - tail, 2 * count + 2)) / 2.0 / hours
+    low = float(gammaincinv(count, tail)) if count else 0.0
+    return low / hours, float(gammaincinv(count + 1, 1.0 - tail)) / hours
 
 
 def _flights(study: Study, columns: Mapping[str, Column]) -> Flights:
