@@ -108,7 +108,8 @@ def studies(draw: Draw) -> Any:
     tables["refine"] = {"initial": 2, "block": 2, "most": 6}
     few: dict[str, Any] = {"count": 2}
     tables["axis"] = [
-        axis | (few if "count" in axis else {"values": axis["values"][:2]}) for axis in tables["axis"][:2]
+        axis | (few if "count" in axis else {key: axis[key][:2] for key in ("values", "case") if key in axis})
+        for axis in tables["axis"][:2]
     ]
     return changed(draw, tables, most=4)
 
