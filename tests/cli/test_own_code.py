@@ -129,8 +129,7 @@ def test_check_refuses_in_one_line(
 def test_check_gives_a_part_the_settings_that_it_needs(tmp_path: Path) -> None:
     done = run("check", wind(tmp_path, default="..."), "--set", "speed=2.0", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    (tmp_path / "mine.toml").write_text("")
-    assert_refused(run("check", "mine.toml", "--set", "speed=2.0", cwd=tmp_path), "--set")
+    assert_refused(run("check", "hummingbird", "--set", "speed=2.0", cwd=tmp_path), "--set speed", "is a vehicle")
 
 
 def test_a_controller_of_ones_own_obeys_settings_and_presets_or_refuses_them(tmp_path: Path) -> None:
