@@ -240,7 +240,8 @@ def _lines(rows: list[Row]) -> list[str]:
 
 
 def _who(row: Row) -> str:
-    return f"{row['vehicle']} less {joined(row['rotors_lost'])}, {row['controller']}, {row['wind']:g} m/s"
+    lost = f"{row['vehicle']} less {joined(row['rotors_lost'])}"
+    return f"{lost}, {row['controller']}, {row['sensors']}, {row['wind']:g} m/s"
 
 
 def _table(rows: list[Row], level: float) -> PageTable:
