@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
 from rotorfault.logs.stream import Rows, walk
 
@@ -119,10 +118,7 @@ def read_dataflash(path: Path, wanted: Mapping[str, object]) -> DataflashFile:
         If it cannot be opened.
     """
     reader = _Reader(wanted)
-    try:
-        rest, packed = walk(path, reader.step)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    rest, packed = walk(path, reader.step)
     lost = reader.lost + rest
     places = f" at {reader.gaps} places" if reader.gaps > 1 else ""
     reason = f"{lost} bytes{places} are no messages: damaged or cut off" if lost else ""

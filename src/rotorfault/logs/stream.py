@@ -200,7 +200,19 @@ def walk(path: Path, step: Step) -> tuple[int, str]:
         Bytes at the end that were not used.
     str
         What is wrong with the file that it is packed in; empty if nothing is.
+
+    Raises
+    ------
+    InputError
+        If it cannot be opened or read.
     """
+    try:
+        return _walk(path, step)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def _walk(path: Path, step: Step) -> tuple[int, str]:
     size = path.stat().st_size
     with content(path) as log, Bar(f"reading {path.name}", size, "bytes") as bar:
         rest, done = b"", 0

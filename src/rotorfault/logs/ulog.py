@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
 from rotorfault.logs.stream import Rows, walk
 
@@ -227,10 +226,7 @@ def read_ulog(path: Path, wanted: Mapping[str, object]) -> ULogFile:
         If it cannot be opened.
     """
     reader = _Reader(wanted)
-    try:
-        rest, packed = walk(path, reader.step)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    rest, packed = walk(path, reader.step)
     lost, said = reader.lost + rest, [packed] if packed else []
     if lost:
         places = f" at {reader.gaps} places" if reader.gaps > 1 else ""

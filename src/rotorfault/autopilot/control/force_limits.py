@@ -9,6 +9,12 @@ from rotorfault.maths.scalar import Scalar, clip, maximum, minimum, sqrt
 from rotorfault.model.motion import greatest_thrust
 from rotorfault.model.vehicle import Vehicle
 
+# Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
+LEAST_THRUST = 0.3
+# Cosine of the tilt down to which thrust may rise as 1/cos, and from which on it fades: that of the cascade's default
+# `cos_min`, 73 degrees. Upside down thrust only adds to the fall.
+LEAST_COSINE = 0.3
+
 
 class ForceLimits(Protocol):
     """Limits of a specific force."""

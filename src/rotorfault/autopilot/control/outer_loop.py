@@ -15,18 +15,13 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from rotorfault.autopilot.control.force_limits import limited_force
+from rotorfault.autopilot.control.force_limits import LEAST_COSINE, LEAST_THRUST, limited_force
 from rotorfault.autopilot.control.protocol import ControlInputs
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import Vec3
 from rotorfault.maths.scalar import Scalar, absolute, clip, less, maximum, minimum, select
 from rotorfault.model.block import Context
 from rotorfault.model.motion import drag_acceleration
-
-# Of the weight, kept while the body hangs upside down: a rotor without thrust gives no torque. As in `spinning`.
-LEAST_THRUST = 0.3
-# Cosine of the tilt down to which thrust rises as 1/cos: that of the cascade's default, 73 degrees.
-LEAST_COSINE = 0.3
 
 
 class OuterSettings(Strict):

@@ -6,6 +6,7 @@ from typing import final
 
 from rotorfault.autopilot.allocation.available import HOVER_RESERVE
 from rotorfault.autopilot.control.attitude import AttitudeReference, AttitudeTracking, Wanted
+from rotorfault.autopilot.control.force_limits import LEAST_COSINE, LEAST_THRUST
 from rotorfault.autopilot.control.protocol import ControlInputs
 from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
@@ -22,11 +23,6 @@ from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Wrench
 
-# Of the weight, kept at any tilt: a rotor without thrust gives no torque. Our choice.
-LEAST_THRUST = 0.3
-# Cosine of the tilt from which on thrust fades, as far as yaw is given up: where the upright law lets it rise no
-# further (`cos_min`). Upside down it only adds to the fall.
-SIDEWAYS = 0.3
 # Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
 # rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
 FASTEST = 10.0
@@ -131,7 +127,7 @@ class Spinning:
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
-        lifts = clip(self.cosine / SIDEWAYS, 0.0, 1.0)
+        lifts = clip(self.cosine / LEAST_COSINE, 0.0, 1.0)
         relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
         beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
