@@ -264,11 +264,14 @@ def test_the_belief_is_that_of_the_page(flight: Flight) -> None:
     F, threshold = f["expected_thrust"], f["diagnosis.threshold"]
     since, flags, smoothed, below = (np.zeros(4) for _ in range(4))
     blend = 1 - np.exp(-T / s.smoothing)
+    delay = sum(1 / pole for pole in f.scenario.diagnosis.settings.poles)
+    late = F[0]
     flagged, believed = [], []
     for i in range(f.count):
         r = f["thrust_residual"][i]
         off = np.sort(r)[-2] - r
-        loss = np.clip(off / np.maximum(F[i], limit), 0, 1)
+        late = late + (F[i] - late) * T / (delay + T)
+        loss = np.clip(off / np.maximum(late, limit), 0, 1)
         elapsed = T if i else 0.0
         suspected = np.abs(off) > threshold[i]
         since = np.where(suspected, since + elapsed, 0)
@@ -276,7 +279,7 @@ def test_the_belief_is_that_of_the_page(flight: Flight) -> None:
         shown = np.minimum(F[i] / hover, 1) ** 2
         below = np.where(np.abs(off) < s.clear_threshold * np.maximum(F[i], hover), below + elapsed * shown, 0)
         cleared = (below >= s.clear_persistence - T / 2) & ~raised
-        margin = np.maximum(threshold[i] / F[i] - s.threshold, 0)
+        margin = np.maximum(threshold[i] / np.maximum(late, limit) - s.threshold, 0)
         gap = loss - smoothed
         open_ = np.clip(gap, -margin, margin)
         followed = smoothed + blend * (gap - open_ + shown * open_)

@@ -60,7 +60,7 @@ class Mismatch(Strict):
     torque_ratio: Factors = 1.0
     linear_drag: Annotated[float, Field(ge=0.0)] = 1.0
     sensor_noise: Factor = Field(
-        default=1.0, description="true errors of the sensors over those that the autopilot believes"
+        default=1.0, description="errors of the sensors over those that the autopilot believes"
     )
     centre_of_mass: tuple[Shift, Shift, Shift] = Field(
         default=(0.0, 0.0, 0.0), description="true less believed centre of mass: forward, left, up [m]"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,8 @@ VEHICLE = load_vehicle("paper").vehicle
 HOVER = hover_thrust(VEHICLE).r1
 T = 1e-3
 TEST_TIME = 0.1
-STUCK = StuckParameters(lateness=0.014, settled=0.033, missed=0.06)
+STUCK = StuckParameters(settled=0.033, missed=0.06)
+SLOW, FAST = 120.0, 180.0  # rad/s: poles of an observer
 
 
 def arr(values: PerRotor) -> Array:
@@ -57,8 +59,8 @@ def step(
     return decide(memory, evidence, VEHICLE, parameters, dt)[:2]
 
 
-def numbers(**settings: float) -> DecisionParameters:
-    return decision_parameters(DecisionSettings(**settings), TEST_TIME, STUCK)
+def numbers(lateness: float = 0.0, **settings: float) -> DecisionParameters:
+    return decision_parameters(DecisionSettings(**settings), lateness, TEST_TIME, STUCK)
 
 
 def decisions(
@@ -273,3 +275,26 @@ def test_smoothing_is_first_order_from_the_first_suspicion() -> None:
 def test_thresholds_out_of_order_are_refused() -> None:
     with pytest.raises(InputError, match=r"clear_threshold 0\.2 must not exceed threshold 0\.1"):
         validate(DecisionSettings, {"clear_threshold": 0.2}, "test")
+
+
+@pytest.mark.parametrize("command", [lambda k: 0.3 if k < 50 else 3.0, lambda k: 1.0 + 0.02 * min(k, 100)])
+def test_a_dead_rotor_that_is_told_to_give_more_is_believed_dead_all_the_same(
+    command: Callable[[int], float],
+) -> None:
+    """What it lacks shows late; beside the thrust of the same instant it would seem to give a part of it."""
+
+    def least_belief(lateness: float) -> float:
+        dead, _ = run(undecided(hover=HOVER), 1.0, HOVER, 300)
+        parameters, memory, believed = numbers(lateness), dead._replace(late=PerRotor.all(HOVER)), []
+        first = shown = -HOVER
+        asked = HOVER
+        for k in range(200):
+            asked += (command(k) * HOVER - asked) * (1.0 - math.exp(-T / 0.02))
+            first += (-asked - first) * (1.0 - math.exp(-SLOW * T))
+            shown += (first - shown) * (1.0 - math.exp(-FAST * T))
+            memory, told = step(memory, PerRotor(shown, 0.0, 0.0, 0.0), PerRotor.all(asked), parameters, T)
+            believed.append(told.loss.r1)
+        return min(believed)
+
+    assert least_belief(1.0 / SLOW + 1.0 / FAST) > 0.93
+    assert least_belief(0.0) < 0.9

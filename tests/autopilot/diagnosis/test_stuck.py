@@ -14,7 +14,7 @@ from rotorfault.model.signals import Stuck
 
 HOVER, T = 2.0, 1e-3  # N, s
 SLOW, FAST = 120.0, 180.0  # rad/s: the observer's poles
-NUMBERS = StuckParameters(1.0 / SLOW + 1.0 / FAST, 4.0 / SLOW, 0.06)
+NUMBERS = StuckParameters(4.0 / SLOW, 0.06)
 
 
 def moving(time: float) -> float:
@@ -37,15 +37,16 @@ def watch(
 
     `yaw` is what the observer gets wrong about the yaw axis, in N of each rotor: of the partners 1 and 2 alike.
     """
-    memory, told = nobody_judged(), []
+    memory, told, late = nobody_judged(), [], asked(0.0)
     first = shown = gives(asked(0.0)) - asked(0.0)
     for k in range(steps):
         f = asked(k * T)
         first += (gives(f) - f - first) * (1.0 - math.exp(-SLOW * T))
         shown += (first - shown) * (1.0 - math.exp(-FAST * T))
+        late += (f - late) * T / (1.0 / SLOW + 1.0 / FAST + T)
         e = yaw(k * T)
         seen = Seen(
-            thrust=PerRotor(HOVER, f, HOVER, HOVER),
+            thrust=PerRotor(HOVER, late, HOVER, HOVER),
             residual=PerRotor(e, shown + e, -e, -e),
             partner=PerRotor(shown + e, e, -e, -e),
             partner_flagged=PerRotor(flags[1], flags[0], flags[3], flags[2]),

@@ -20,7 +20,9 @@ show a loss.
 below ``clear_threshold`` for ``clear_persistence``; the time counts as far as its thrust could have shown a loss,
 :math:`\min(F_i/F_{hover}, 1)^2`.
 
-**Belief.** :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i -
+**Belief.** What is missing shows late, by the mean delay 1/p + 1/q of the observer's poles. So it is compared with a
+thrust as late, :math:`F_i` behind a lag of that time: else a rotor that is told to give more seems to give it.
+With it :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i -
 threshold`, which is 0 in steady hover, and not at all where a sound rotor would give less than 5 % of F_max. The
 believed loss follows it with the time constant ``smoothing`` as far as it lies outside of that margin, and within it
 more slowly, by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too much is flagged with a loss of 0: no
@@ -108,6 +110,7 @@ class DecisionParameters(NamedTuple):
     smoothing: Scalar  # s
     test_thrust: Scalar
     test_interval: Scalar  # s
+    lateness: Scalar  # s: from a loss of thrust to what the observer shows of it, on average
     test_time: Scalar  # s: length of a test
     stuck: StuckParameters
 
@@ -120,6 +123,7 @@ class DecisionMemory(NamedTuple):
     flagged: PerRotor  # 1 or 0
     smoothed: PerRotor  # smoothed loss
     tested: PerRotor  # s: time since the last test began
+    late: PerRotor  # N: thrust of a sound rotor, as late as the observer shows what is missing
     stuck: StuckMemory
 
 
@@ -132,12 +136,16 @@ class Evidence(NamedTuple):
     noise: PerRotor  # standard deviation of the difference of its residual from another's
 
 
-def decision_parameters(settings: DecisionSettings, test_time: float, stuck: StuckParameters) -> DecisionParameters:
+def decision_parameters(
+    settings: DecisionSettings, lateness: float, test_time: float, stuck: StuckParameters
+) -> DecisionParameters:
     """Numbers of the settings as a record.
 
     Parameters
     ----------
     settings : DecisionSettings
+    lateness : float, s
+        Mean delay of the observer.
     test_time : float, s
         How long a rotor needs to show its thrust.
     stuck : StuckParameters
@@ -153,15 +161,16 @@ def decision_parameters(settings: DecisionSettings, test_time: float, stuck: Stu
         s.smoothing,
         s.test_thrust,
         s.test_interval,
+        lateness,
         test_time,
         stuck,
     )
 
 
-def undecided(rotors: int = 4) -> DecisionMemory:
-    """Nothing seen yet, of so many rotors."""
+def undecided(rotors: int = 4, hover: Scalar = 0.0) -> DecisionMemory:
+    """Nothing seen yet, of so many rotors that give the thrust of hover [N]."""
     none = PerRotor.all(0.0, rotors)
-    return DecisionMemory(none, none, none, none, none, nobody_judged(rotors))
+    return DecisionMemory(none, none, none, none, none, PerRotor.all(hover, rotors), nobody_judged(rotors))
 
 
 def second_best(residual: PerRotor) -> Scalar:
@@ -232,7 +241,8 @@ def decide(
         In N, of what is missing.
     """
     p, sound = parameters, second_best(evidence.residual)
-    per_thrust = _per_thrust(evidence.thrust, vehicle)
+    late = memory.late + (evidence.thrust - memory.late) * (dt / (p.lateness + dt))
+    per_thrust = _per_thrust(late, vehicle)
     losses = _loss(sound, evidence.residual, per_thrust)
     hover, least = hover_thrust(vehicle).sum() / vehicle.rotors, SMALL_THRUST * mean_of(vehicle.thrust_max)
     excess = evidence.residual.reduce(maximum) - sound
@@ -285,7 +295,7 @@ def decide(
         test = select(both(doubted, less(tested, p.test_time)), small, 0.0)
         return threshold, test, since, below, flagged, smoothed, tested
 
-    before = (DecisionMemory(*values, memory.stuck) for values in zip(*memory[:-1], strict=True))
+    before = (DecisionMemory._make((*values, memory.stuck)) for values in zip(*memory[:-1], strict=True))
 
     def opposite(values: PerRotor) -> PerRotor:
         r1, r2, r3, r4 = in_pairs(vehicle, values)
@@ -308,8 +318,8 @@ def decide(
     rows = zip(losses, *known, before, strict=True)
     columns = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
     threshold, test, since, below, flagged, smoothed, tested = columns
-    seen = Seen(evidence.thrust, evidence.residual, partners, at_fault, flagged)
+    seen = Seen(late, evidence.residual, partners, at_fault, flagged)
     judgement, held = judged(memory.stuck, seen, sound, hover, p.stuck, dt)
-    decided = DecisionMemory(since, below, flagged, smoothed, tested, judgement)
+    decided = DecisionMemory(since, below, flagged, smoothed, tested, late, judgement)
     loss = decided.smoothed * decided.flagged
     return decided, Diagnosis(loss, decided.flagged, losses, evidence.residual, test, held), threshold

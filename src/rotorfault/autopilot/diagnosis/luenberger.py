@@ -60,7 +60,7 @@ from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.maths.scalar import Scalar, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.effectiveness import effectiveness
-from rotorfault.model.mixer import nominal_inverse
+from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.motion import (
     drag_acceleration,
     greatest_thrust,
@@ -190,8 +190,10 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         gains = place(carry, decay, (math.exp(-p * period), math.exp(-q * period)))
         dynamics = Dynamics(*gains, noise_gain(*gains, period), math.exp(-w * period))
         shown, decision = SHOWN / min(p, q), self.settings.decision
-        stuck = StuckParameters(1.0 / p + 1.0 / q, shown, decision.clear_threshold)
-        return LuenbergerParameters(carry, decay, dynamics, decision_parameters(decision, SHOWN / w + shown, stuck))
+        stuck = StuckParameters(shown, decision.clear_threshold)
+        return LuenbergerParameters(
+            carry, decay, dynamics, decision_parameters(decision, 1.0 / p + 1.0 / q, SHOWN / w + shown, stuck)
+        )
 
     def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
         """Start at the estimated rates without deviation."""
@@ -202,7 +204,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             zeros(),
             0.0,
             nothing_shown(inputs.vehicle.rotors),
-            undecided(inputs.vehicle.rotors),
+            undecided(inputs.vehicle.rotors, hover_thrust(inputs.vehicle).sum() / inputs.vehicle.rotors),
             PerRotor.all(0.0, inputs.vehicle.rotors),
         )
 

@@ -17,7 +17,7 @@ Y is F less what the rotor's residual lacks of its partner's: two opposite rotor
 the observer gets wrong about yaw is in both. That matters here, for a model whose rotor turns faster while the true
 one is stuck is wrong about the reaction. Where the partner is at fault too, the second best residual takes its place.
 
-F passes a lag with the mean delay of the observer's poles, :math:`1/p + 1/q`, so that it comes as late as Y. For the
+F comes as late as Y (`rotorfault.autopilot.diagnosis.decision`). For the
 first four of the slower pole's time constants after a flag the observer has not shown the fault yet, and nothing is
 judged.
 
@@ -40,7 +40,6 @@ WINDOW = 0.2  # s: time constant of the means; as long as a fault takes to be cl
 class StuckParameters(NamedTuple):
     """Numbers of the judgement."""
 
-    lateness: Scalar  # s: mean delay of the observer
     settled: Scalar  # s: until the observer has shown a fault
     missed: Scalar  # share of hover thrust that an explanation may miss
 
@@ -50,7 +49,6 @@ class StuckMemory(NamedTuple):
 
     judged: PerRotor  # 1 for that rotor
     since: Scalar  # s: time since it was flagged
-    late: Scalar  # N: thrust of a sound rotor, as late as the observer
     given: Scalar  # N: mean estimated thrust
     product: Scalar  # N^2: mean of its product with that of a sound rotor
     square: Scalar  # N^2: mean square of that of a sound rotor
@@ -59,7 +57,7 @@ class StuckMemory(NamedTuple):
 class Seen(NamedTuple):
     """What is known of each rotor at one instant."""
 
-    thrust: PerRotor  # N: of a sound rotor
+    thrust: PerRotor  # N: of a sound rotor, as late as the observer
     residual: PerRotor  # N: thrust estimated less that
     partner: PerRotor  # N: the residual of the rotor opposite
     partner_flagged: PerRotor  # 1 where a fault of the rotor opposite is declared
@@ -68,7 +66,7 @@ class Seen(NamedTuple):
 
 def nobody_judged(rotors: int = 4) -> StuckMemory:
     """Before the first instant, of so many rotors."""
-    return StuckMemory(PerRotor.all(0.0, rotors), 0.0, 0.0, 0.0, 0.0, 0.0)
+    return StuckMemory(PerRotor.all(0.0, rotors), 0.0, 0.0, 0.0, 0.0)
 
 
 def judged(
@@ -100,16 +98,15 @@ def judged(
         return chosen
 
     thrust = of_it(seen.thrust)
-    late = select(kept, memory.late + (thrust - memory.late) * (dt / (parameters.lateness + dt)), thrust)
     beside = select(of_it(seen.partner_flagged), second_best, of_it(seen.partner))
-    y = late - (beside - of_it(seen.residual))
+    y = thrust - (beside - of_it(seen.residual))
 
     since = select(kept, memory.since + dt, 0.0)
     settled = greater_equal(since, parameters.settled)
     weight = select(settled, dt / WINDOW, 1.0)
     given = memory.given + (y - memory.given) * weight
-    product = memory.product + (late * y - memory.product) * weight
-    square = memory.square + (late * late - memory.square) * weight
+    product = memory.product + (thrust * y - memory.product) * weight
+    square = memory.square + (thrust * thrust - memory.square) * weight
 
     bar = parameters.missed * hover
     bar = bar * bar
@@ -119,7 +116,7 @@ def judged(
     is_stuck = both(both(settled, known), less(bar, missed))
     stuck = which.map(lambda it: both(it, is_stuck))
     held = maximum(given, 0.0)
-    after = StuckMemory(which, since, late, given, product, square)
+    after = StuckMemory(which, since, given, product, square)
     return after, Stuck(stuck, stuck.map(lambda on: select(on, held, 0.0)))
 
 
