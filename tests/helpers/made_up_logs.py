@@ -27,6 +27,7 @@ class Flown(NamedTuple):
     force: Array  # (n, 3)
     velocity: Array
     position: Array
+    frame: str = "quad-x"
 
 
 def flown(
@@ -39,16 +40,22 @@ def flown(
     noise: float = 0.01,
     push: tuple[float, float, float] = (0.0, 0.0, 0.0),
     lag: float = 0.03,
+    frame: str = "quad-x",
+    stirred: float = 0.0,
 ) -> Flown:
-    """Fly it: rotors lag, attitude is held by a PD law, height by what the mean command has to be."""
+    """Fly it: rotors lag, attitude is held by a PD law, height by what the mean command has to be.
+
+    `stirred` moves the attitude that is wanted about all axes by so many rad, as a pilot does.
+    """
     rng = np.random.default_rng(seed)
-    rows = directions(named_layout("quad-x", ""))
-    mixer = np.linalg.pinv(np.vstack([np.ones(4), rows]))
+    rows = directions(named_layout(frame, ""))
+    motors = rows.shape[1]
+    mixer = np.linalg.pinv(np.vstack([np.ones(motors), rows]))
     step, count = 1.0 / RATE, int(seconds * RATE)
-    omega, angle, integral, rotors = np.zeros(3), np.zeros(3), np.zeros(3), np.full(4, HOVER)
+    omega, angle, integral, rotors = np.zeros(3), np.zeros(3), np.zeros(3), np.full(motors, HOVER)
     gust = np.zeros(3)
-    strength = np.exp(np.array(imbalance))
-    command, rates, force = np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3))
+    strength = np.exp(np.array(imbalance)) if motors == 4 else np.ones(motors)
+    command, rates, force = np.zeros((count, motors)), np.zeros((count, 3)), np.zeros((count, 3))
     lift = 0.0
     for k in range(count):
         now = k * step
@@ -56,10 +63,11 @@ def flown(
         if rotor is not None and now >= onset:
             left[rotor] *= 1.0 - loss
         measured = omega + noise * rng.normal(size=3)
-        integral = integral + angle * step
-        wanted = -(14.0 * measured + 60.0 * angle + 30.0 * integral) / GAIN / 1.0
+        off = angle - stirred * np.sin(2.0 * np.pi * np.array([0.9, 0.7, 0.5]) * now + np.arange(3.0))
+        integral = integral + off * step
+        wanted = -(14.0 * measured + 60.0 * off + 30.0 * integral) / GAIN / 1.0
         mean = float(np.clip(HOVER - 0.3 * lift, 0.1, 0.9))
-        asked = np.clip(mixer @ np.concatenate([[4.0 * mean], wanted]), 0.0, 1.0)
+        asked = np.clip(mixer @ np.concatenate([[motors * mean], wanted]), 0.0, 1.0)
         rotors = rotors + (asked - rotors) * (1.0 - np.exp(-step / lag))
         gust = gust * 0.98 + 0.001 * rng.normal(size=3)
         pushed = np.array(push) if now >= onset else np.zeros(3)
@@ -72,7 +80,7 @@ def flown(
     time = 10.0 + step * np.arange(count)
     height = np.clip(np.arange(count) * step, 0.0, 2.0)
     still = np.zeros((count, 3))
-    return Flown(time, command, rates, force, still, np.column_stack([0 * height, 0 * height, height]))
+    return Flown(time, command, rates, force, still, np.column_stack([0 * height, 0 * height, height]), frame)
 
 
 def log_of(flight: Flown, name: str = "made-up") -> Log:
@@ -82,16 +90,18 @@ def log_of(flight: Flown, name: str = "made-up") -> Log:
         "specific_force": Series(flight.time, flight.force), "velocity": Series(flight.time, flight.velocity),
         "position": Series(flight.time, flight.position),
     }  # fmt: skip
-    return Log(name, "made up", named_layout("quad-x", "a test"), series)
+    return Log(name, "made up", named_layout(flight.frame, "a test"), series)
 
 
-def write_csv(flight: Flown, path: Path) -> Path:
-    """The flight as our documented table."""
-    names = ["time", *(f"motor_{k}" for k in range(1, 5)), "gyro_x", "gyro_y", "gyro_z", "acc_x", "acc_y", "acc_z",
-             "vx", "vy", "vz", "x", "y", "z"]  # fmt: skip
-    table = np.column_stack([flight.time, *flight[1:]])
-    lines = ["# motors = quad-x", ",".join(names), *(",".join(f"{v:.9g}" for v in row) for row in table)]
-    path.write_text("\n".join(lines) + "\n")
+def write_csv(flight: Flown, path: Path, says: str | None = None) -> Path:
+    """The flight as our documented table; above it stands its frame, or what else it is to say."""
+    count = flight.command.shape[1]
+    names = ["time", *(f"motor_{k + 1}" for k in range(count)), "gyro_x", "gyro_y", "gyro_z", "acc_x", "acc_y",
+             "acc_z", "vx", "vy", "vz", "x", "y", "z"]  # fmt: skip
+    table = np.column_stack([flight.time, *flight[1:6]])
+    head = f"# motors = {flight.frame}" if says is None else says
+    lines = [head, ",".join(names), *(",".join(f"{v:.9g}" for v in row) for row in table)]
+    path.write_text("\n".join(filter(None, lines)) + "\n")
     return path
 
 
@@ -186,17 +196,47 @@ def write_dataflash(flight: Flown, path: Path, every: int = 4) -> Path:
     return path
 
 
-def write_betaflight(flight: Flown, path: Path) -> Path:
-    """The flight as Betaflight's decoder writes it; its motors are counted otherwise."""
-    order = [3, 0, 1, 2]  # rear right, front right, rear left, front left by our quad X
-    gyro = np.degrees(flight.rates)
-    names = ["loopIteration", "time (us)", *(f"motor[{k}]" for k in range(4)), *(f"gyroADC[{k}]" for k in range(3))]
-    rows = [
-        ",".join([str(k), str(int(t * 1e6)), *(f"{1000 + 1000 * u:.2f}" for u in flight.command[k][order]),
-                  *(f"{v:.4f}" for v in gyro[k])])
-        for k, t in enumerate(flight.time)
-    ]  # fmt: skip
-    path.write_text("\n".join(['"Product","Blackbox flight data recorder"', ", ".join(names), *rows]) + "\n")
+def write_betaflight(
+    flight: Flown,
+    path: Path,
+    header: bool = True,
+    pulses: bool = True,
+    units: tuple[str, str, str] = ("us", "", ""),
+    order: tuple[int, ...] = (3, 0, 1, 2),
+    speeds: bool = False,
+    outward: bool = False,
+) -> Path:
+    """The flight as Betaflight's decoder or its viewer writes it.
+
+    Motors are counted otherwise: rear right, front right, rear left, front left by our quad X. `header` is what a
+    viewer writes above; `units` are those of time, gyro and accelerometer; `outward` exchanges the propellers. Thrust
+    follows the signal by T = 0.45 u + 0.55 u^2, and the square of the speed.
+    """
+    count = len(order)
+    time_unit, gyro_unit, acc_unit = units
+    share = np.clip(flight.command[:, order], 0.0, 1.0)
+    signal = (np.sqrt(0.45**2 + 4.0 * 0.55 * share) - 0.45) / (2.0 * 0.55)
+    low, high = (1000.0, 2000.0) if pulses else (158.0, 2047.0)
+    gyro = {"rad/s": 1.0, "deg/s": np.degrees(1.0), "": np.degrees(1.0)}[gyro_unit] * flight.rates
+    acc = flight.force * {"": 2048.0 / 9.80665, "g": 1.0 / 9.80665, "m/s2": 1.0}[acc_unit]
+    yaw = -1.0 if outward else 1.0
+    columns = {
+        "loopIteration": np.arange(len(flight.time)),
+        f"time ({time_unit})": flight.time * (1e6 if time_unit == "us" else 1.0),
+        **{f"gyroADC[{k}]" + (f" ({gyro_unit})" if gyro_unit else ""): gyro[:, k] * (yaw if k == 2 else 1.0)
+           for k in range(3)},
+        **{f"accSmooth[{k}]" + (f" ({acc_unit})" if acc_unit else ""): acc[:, k] for k in range(3)},
+        **{f"motor[{k}]": np.rint(low + (high - low) * signal[:, k]) for k in range(count)},
+        **({f"eRPM[{k}]": np.rint(2500.0 * np.sqrt(share[:, k])) for k in range(count)} if speeds else {}),
+        "vbatLatest (V)": np.full(len(flight.time), 15.8),
+    }  # fmt: skip
+    table = np.column_stack([*columns.values()])
+    text = [",".join([*(f"{v:.10g}" for v in row), "ANGLE_MODE|AIRMODE"]) for row in table]
+    names = [*columns, "flightModeFlags (flags)"]
+    above = ['"Product","Blackbox flight data recorder by Nicholas Sherlock"', '"Firmware type","Cleanflight"',
+             f'"motorOutput","{low:.0f},{high:.0f}"', '"gyro_scale","0x3f800000"', '"acc_1G","2048"',
+             '"motor_poles","12"']  # fmt: skip
+    path.write_text("\n".join([*(above if header else []), ", ".join(names), *text]) + "\n")
     return path
 
 

@@ -58,8 +58,9 @@ def test_betaflights_motors_keep_their_own_numbers(flight: Flown, tmp_path: Path
     log = read_log(write_betaflight(flight, tmp_path / "a.csv"))
     assert log.layout is not None
     assert log.layout.names == ["rear right", "front right", "rear left", "front left"]
-    agrees(log, "command", flight.command[:, [3, 0, 1, 2]], flight.time, 1e-4)
+    agrees(log, "command", flight.command[:, [3, 0, 1, 2]], flight.time, 1e-3)
     agrees(log, "rates", flight.rates, flight.time, 1e-4)
+    agrees(log, "specific_force", flight.force, flight.time, 1e-4)
 
 
 def test_a_flight_of_rotorfault_is_read_with_what_its_autopilot_knew(tmp_path: Path) -> None:

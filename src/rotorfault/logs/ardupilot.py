@@ -21,9 +21,13 @@ from rotorfault.maths.rotation import Quat
 from rotorfault.model.importers.ardupilot import BY_NUMBERS
 from rotorfault.model.thrust_curve import share_of
 
-WANTED = dict.fromkeys(("RCOU", "ATT", "RATE", "IMU", "XKF1", "NKF1", "BAT", "CURR", "ESC", "CTUN", "XKF2", "NKF2"))
+WANTED = dict.fromkeys(
+    ("RCOU", "ATT", "RATE", "IMU", "XKF1", "NKF1", "XKF4", "NKF4", "BAT", "CURR", "ESC", "CTUN", "XKF2", "NKF2")
+)
 FLIP = np.array([1.0, -1.0, -1.0])
-FIRST_MOTOR = 33  # SERVOn_FUNCTION of motor 1
+FUNCTIONS = {**{33 + k: k for k in range(8)}, **{82 + k: 8 + k for k in range(4)}}  # SERVOn_FUNCTION: index of motor
+OTHERS = re.compile(r"\b(ArduPlane|Rover|ArduSub|Blimp|AntennaTracker)\b")  # vehicles whose logs look alike
+FORMER = {0.0: (1, 0), 1.0: (1, 1)}  # FRAME of versions before 3.5: FRAME_CLASS and FRAME_TYPE
 
 
 def read_ardupilot_log(path: Path) -> Log:
@@ -40,7 +44,7 @@ def read_ardupilot_log(path: Path) -> Log:
     """
     file = read_dataflash(path, WANTED)
     remarks: list[str] = []
-    layout = _layout(file)
+    layout, why = _layout(file)
     if layout is not None and layout.assumed:
         remarks.append(f"motor places are assumed: {layout.source}")
     series = {**_motion(file), **_commands(file, layout, remarks), **_power(file, layout)}
@@ -49,7 +53,9 @@ def read_ardupilot_log(path: Path) -> Log:
             remarks.append(f"{message.name}: one of {message.rows.every} records is used, the log being long")
     damage = Damage(file.lost, file.reason)
     notes = tuple(_note(time * 1e-6, text) for time, text in file.texts)
-    return Log(path.name, "ArduPilot dataflash", layout, series, file.parameters, notes, damage, tuple(remarks))
+    return Log(
+        path.name, "ArduPilot dataflash", layout, series, file.parameters, notes, damage, tuple(remarks), why
+    )  # fmt: skip
 
 
 def _note(time: float, text: str) -> Note:
@@ -58,9 +64,14 @@ def _note(time: float, text: str) -> Note:
 
 
 def _series(
-    file: DataflashFile, name: str, fields: Sequence[str], scale: Array | float = 1.0, index: str = ""
+    file: DataflashFile,
+    name: str,
+    fields: Sequence[str],
+    scale: Array | float = 1.0,
+    index: str = "",
+    which: int | None = None,
 ) -> Series | None:
-    """Some fields of a message; of those that have several instances, the first."""
+    """Some fields of a message; of those that have several instances, the one that is asked for, or the first."""
     message = file.messages.get(name)
     if message is None or not len(message.rows):
         return None
@@ -69,7 +80,8 @@ def _series(
     if "TimeUS" not in names or any(f not in names or table.dtype[f].kind not in "fiu" for f in fields):
         return None
     if index in names and table.dtype[index].kind in "iu":
-        table = table[table[index] == table[index].min()]
+        one = which if which is not None and (table[index] == which).any() else table[index].min()
+        table = table[table[index] == one]
     with np.errstate(invalid="ignore"):
         values = np.column_stack([table[f].astype(float) * message.scale.get(f, 1.0) for f in fields]) * scale
     return Series(table["TimeUS"].astype(float) * 1e-6, values)
@@ -82,19 +94,16 @@ def _motion(file: DataflashFile) -> dict[str, Series]:
         or _series(file, "RATE", ("R", "P", "Y"), FLIP * degrees),
         "specific_force": _series(file, "IMU", ("AccX", "AccY", "AccZ"), FLIP, "I"),
     }
-    for name in ("XKF1", "NKF1"):
-        found.setdefault("velocity", _series(file, name, ("VN", "VE", "VD"), FLIP, "C"))
-        found.setdefault("position", _series(file, name, ("PN", "PE", "PD"), FLIP, "C"))
-        if found["velocity"] is None:
-            found.pop("velocity")
-            found.pop("position")
+    for filter_ in ("XKF", "NKF"):
+        core = _primary(file, f"{filter_}4")
+        velocity = _series(file, f"{filter_}1", ("VN", "VE", "VD"), FLIP, "C", core)
+        position = _series(file, f"{filter_}1", ("PN", "PE", "PD"), FLIP, "C", core)
+        wind = _series(file, f"{filter_}2", ("VWN", "VWE"), np.array([1.0, -1.0]), "C", core)
+        found |= {name: one for name, one in (("velocity", velocity), ("position", position), ("wind", wind))
+                  if found.get(name) is None}  # fmt: skip
     angles = _series(file, "ATT", ("Roll", "Pitch", "Yaw"), FLIP * degrees)
     if angles is not None:
         found["attitude"] = Series(angles.time, quaternions(angles.values))
-    for name in ("XKF2", "NKF2"):
-        found.setdefault("wind", _series(file, name, ("VWN", "VWE"), np.array([1.0, -1.0]), "C"))
-        if found["wind"] is None:
-            found.pop("wind")
     return {name: one for name, one in found.items() if one is not None}
 
 
@@ -110,12 +119,30 @@ def quaternions(angles: Array) -> Array:
     return np.column_stack([q.w, q.x, q.y, q.z])
 
 
-def _layout(file: DataflashFile) -> Layout | None:
+def _primary(file: DataflashFile, name: str) -> int | None:
+    """The core of the filter that flew for most of the log."""
+    flown = _series(file, name, ("PI",))
+    if flown is None or not len(flown.values) or not np.isfinite(flown.values).all() or flown.values.min() < 0.0:
+        return None
+    return int(np.bincount(flown.values[:, 0].astype(int)).argmax())
+
+
+def _layout(file: DataflashFile) -> tuple[Layout | None, str]:
+    """The frame by its numbers, and why there is none."""
+    for _, text in file.texts:
+        if (other := OTHERS.search(text)) is not None:
+            return None, f"it is a log of {other[1]}: only multirotors can be diagnosed"
     kind, type_ = file.parameters.get("FRAME_CLASS"), file.parameters.get("FRAME_TYPE", 1.0)
-    if kind is None or not np.isfinite([kind, type_]).all():
-        return named_layout("quad-x", "ArduPilot's quad X; the log names no frame", assumed=True)
+    if kind is None:
+        former = FORMER.get(file.parameters.get("FRAME", -1.0))
+        if former is not None:
+            return named_layout(BY_NUMBERS[former], f"FRAME {file.parameters['FRAME']:.0f}", assumed=True), ""
+        return named_layout("quad-x", "ArduPilot's quad X; the log names no frame", assumed=True), ""
+    if not np.isfinite([kind, type_]).all():
+        return None, "FRAME_CLASS and FRAME_TYPE are no numbers"
     frame = BY_NUMBERS.get((int(kind), int(type_)))
-    return None if frame is None else named_layout(frame, f"FRAME_CLASS {kind:.0f}, FRAME_TYPE {type_:.0f}")
+    said = f"FRAME_CLASS {kind:.0f}, FRAME_TYPE {type_:.0f}"
+    return (None, f"{said} is no frame that is known") if frame is None else (named_layout(frame, said), "")
 
 
 def _commands(file: DataflashFile, layout: Layout | None, remarks: list[str]) -> dict[str, Series]:
@@ -136,15 +163,18 @@ def _commands(file: DataflashFile, layout: Layout | None, remarks: list[str]) ->
     return found
 
 
-def _output(file: DataflashFile, count: int) -> Series | None:
-    parameters = file.parameters
+def _channels(file: DataflashFile, count: int) -> dict[int, int]:
+    """The output of each motor, from 1; as they are by default where nothing says it."""
     channels = {
-        int(value) - FIRST_MOTOR: number
-        for number in range(1, 15)
-        if FIRST_MOTOR <= (value := parameters.get(f"SERVO{number}_FUNCTION", 0.0)) < FIRST_MOTOR + 8
+        FUNCTIONS[int(value)]: number
+        for number in range(1, 33)
+        if (value := file.parameters.get(f"SERVO{number}_FUNCTION", 0.0)) in FUNCTIONS
     }
-    if not channels:
-        channels = {k: k + 1 for k in range(count)}
+    return channels or {k: k + 1 for k in range(count)}
+
+
+def _output(file: DataflashFile, count: int) -> Series | None:
+    parameters, channels = file.parameters, _channels(file, count)
     if any(k not in channels for k in range(count)):
         return None
     pulses = _series(file, "RCOU", [f"C{channels[k]}" for k in range(count)])
@@ -171,8 +201,12 @@ def _power(file: DataflashFile, layout: Layout | None) -> dict[str, Series]:
     names = table.dtype.names or ()
     if not {"TimeUS", "Instance", "RPM", "Curr"} <= set(names):
         return found
+    count = len(layout.places)
+    numbers = [_channels(file, count).get(k, 0) - 1 for k in range(count)]  # an ESC has the number of its output
+    if not set(numbers) <= set(table["Instance"].tolist()):
+        numbers = list(range(count))
     for field, name in (("RPM", "rpm"), ("Curr", "current")):
-        each = [table[table["Instance"] == k] for k in range(len(layout.places))]
+        each = [table[table["Instance"] == k] for k in numbers]
         if all(len(rows) > 1 for rows in each):
             time = each[0]["TimeUS"].astype(float) * 1e-6
             columns = [

@@ -13,14 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorfault.logs.baseline import Baseline, hover_command, trim_of
+from rotorfault.logs.baseline import Baseline, hover_command
 from rotorfault.logs.detectors import Said, said_by_all
 from rotorfault.logs.dynamics import Residual, Response, block_length, residual_of
-from rotorfault.logs.log import Log, when
-from rotorfault.logs.scan import Scan, scan
+from rotorfault.logs.log import Log, Note, when
+from rotorfault.logs.scan import FIRST, Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
 from rotorfault.logs.sentences import own_words, sudden_evidence, trim_evidence, verdict_of
-from rotorfault.logs.trim import PRIOR, Evidence, Trim, directions_of, spread_of, weigh
+from rotorfault.logs.steady import Steady, steady_of
+from rotorfault.logs.trim import PRIOR
 from rotorfault.logs.verdict import Cause, LogDiagnosis
 
 # How often a flight that is looked at has a rotor that suddenly loses thrust, and a lasting push that begins in it.
@@ -28,6 +29,9 @@ from rotorfault.logs.verdict import Cause, LogDiagnosis
 SUDDEN = 0.5 * PRIOR["rotor loss"]
 PUSHED = 0.5 * (PRIOR["wind"] + PRIOR["centre of mass shifted"])
 TAKE_OFF = 1.5  # s in which the ground is near
+IN_FLIGHT = 0.5  # s: a log that begins so shortly before its flight begins in the air
+BLIND, NEAR = 0.3, 0.5  # s without records, and how shortly before an onset, in which it may have begun
+SENT = 0.99  # that a motor gave no thrust, if the log says twice that it was sent none
 PUSHES = {"wind": 0.6, "centre of mass shifted": 0.3, "drag": 0.1}  # what a push from outside is
 
 
@@ -56,6 +60,7 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
     spans = flight_spans(log)
     if log.layout is None or not spans:
         return _nothing(log, limits, bool(log.motors))
+    limits += _limits_of_begin(log, spans)
     hover = hover_of(log, spans)
     response = None if baseline is None else baseline.response
     sudden = _sudden(log, spans, hover, response)
@@ -64,10 +69,14 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
     if first is not None and first.none < 0.5 and first.scan.onset is not None:
         keep = hover.time + 1.0 < first.scan.onset
         before = Hover(*(part[keep] for part in hover))
-    trim = trim_of(before)
-    evidence = None if trim is None else _steady(log, trim, baseline)
-    causes = _ranked(log, first, evidence, trim, baseline)
-    limits += _limits_of_hover(trim, evidence, baseline)
+        limits += _limits_of_onset(log, first.scan.onset)
+    steady = steady_of(log, before, spans, baseline)
+    evidence = None if steady is None else steady.evidence
+    causes = _ranked(log, first, steady, baseline)
+    stopped = next((note for note in log.notes if note.stopped and _inside(note.time, spans)), None)
+    if stopped is not None and not (causes[0].rotor == stopped.motor and causes[0].onset is not None):
+        causes = _with_stopped(log, causes, stopped)
+    limits += _limits_of_hover(steady, baseline)
     said: list[Said] = []
     if vehicle is not None:
         span = max(spans, key=lambda one: one[1] - one[0])
@@ -102,21 +111,22 @@ def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known:
     return found
 
 
-def _steady(log: Log, trim: Trim, baseline: Baseline | None) -> Evidence:
-    """The trim of hover against the baseline's."""
-    layout = log.layout
-    assert layout is not None
-    trims = [] if baseline is None else baseline.trims
-    sagged: float | None = None
-    voltages = [one.voltage for one in trims if math.isfinite(one.voltage)]
-    if voltages and math.isfinite(trim.voltage) and trim.voltage > 0.0:
-        sagged = max(float(np.mean(voltages)) / trim.voltage - 1.0, 0.0)
-    return weigh(layout, trim, spread_of(layout, trims), directions_of(layout)[1], sagged)
+def _inside(time: float, spans: Sequence[tuple[float, float]]) -> bool:
+    """Whether a time is in a flight, or where one ends: a vehicle without a motor soon flies no more."""
+    return any(begin <= time <= end + 1.0 for begin, end in spans)
 
 
-def _ranked(
-    log: Log, sudden: Sudden | None, evidence: Evidence | None, trim: Trim | None, baseline: Baseline | None
-) -> tuple[Cause, ...]:
+def _with_stopped(log: Log, causes: Sequence[Cause], note: Note) -> tuple[Cause, ...]:
+    """Causes with a motor that was sent nothing while the others ran."""
+    said = f"{note.text}, from {when(log, note.time)}"
+    same = ("rotor loss", note.motor)
+    rest = [one._replace(probability=one.probability * (1.0 - SENT)) for one in causes]
+    more = sum(one.probability for one in rest if (one.cause, one.rotor) == same)
+    others = [one for one in rest if (one.cause, one.rotor) != same]
+    return (Cause(*same, 1.0, note.time, SENT + more, said), *others)
+
+
+def _ranked(log: Log, sudden: Sudden | None, steady: Steady | None, baseline: Baseline | None) -> tuple[Cause, ...]:
     """All causes, the most probable first."""
     found: list[Cause] = []
     none = 1.0 if sudden is None else sudden.none
@@ -129,7 +139,7 @@ def _ranked(
         for name, share in PUSHES.items():
             said = f"a lasting push from outside since {when(log, onset)}"
             found.append(Cause(name, None, None, onset, sudden.push * share, said))
-    if evidence is None:
+    if steady is None:
         seen = "nothing else began in flight" if sudden is not None else "nothing in the log speaks for a fault"
         healthy = PRIOR["healthy"] + PRIOR["rotor loss"]
         found.append(Cause("healthy", None, None, None, none * healthy, seen))
@@ -139,14 +149,16 @@ def _ranked(
             Cause(name, None, None, None, none * share, "without hover nothing is known of it") for name in others
         ]
     else:
+        evidence, since = steady.evidence, steady.since
         for (name, rotor), probability in evidence.causes.items():
-            said = trim_evidence(name, rotor, evidence, trim, baseline is not None and bool(baseline.trims))
+            said = trim_evidence(name, rotor, evidence, steady.trim, steady.against)
             loss = None if rotor is None else float(evidence.loss[rotor])
             interval = (
                 None if rotor is None else (float(evidence.interval[rotor][0]), float(evidence.interval[rotor][1]))
             )
             number = None if rotor is None else rotor + 1
-            found.append(Cause(name, number, loss, None, none * probability, said, interval))
+            began = None if name == "healthy" else since
+            found.append(Cause(name, number, loss, began, none * probability, said, interval))
     changed = _changed_parameters(log, baseline)
     if changed:
         found = [one._replace(probability=one.probability * 0.97) for one in found]
@@ -194,6 +206,9 @@ def _limits_of_rates(log: Log) -> list[str]:
     """What the log's rates do not let it tell."""
     limits: list[str] = []
     command, rates = log.series.get("command"), log.series.get("rates")
+    if log.layout is None and log.why:
+        limits.append(log.why)
+        return limits
     if log.layout is None or command is None:
         limits.append(
             "no commands of motors: log actuator_motors or set-points (PX4), RATE and RCOU (ArduPilot), motor_1, ..."
@@ -217,20 +232,50 @@ def _limits_of_rates(log: Log) -> list[str]:
     return limits
 
 
-def _limits_of_hover(trim: Trim | None, evidence: Evidence | None, baseline: Baseline | None) -> list[str]:
-    if trim is None or evidence is None:
+def _limits_of_begin(log: Log, spans: Sequence[tuple[float, float]]) -> list[str]:
+    """What a log that begins in the air does not show."""
+    if spans[0][0] - log.start > IN_FLIGHT:
+        return []
+    return [f"the log begins in flight: what set in before it, or in its first {TAKE_OFF + FIRST:g} s, passes for "
+            "how the vehicle is; log from arming on"]  # fmt: skip
+
+
+def _limits_of_onset(log: Log, onset: float) -> list[str]:
+    """Whether records are missing where something begins."""
+    gaps: list[tuple[float, float]] = []
+    for name in ("rates", "command"):
+        series = log.series[name]
+        ends = np.searchsorted(series.time, [onset - NEAR, onset + 2.0 / max(series.rate, 1.0)])
+        near = series.time[max(int(ends[0]) - 1, 0) : int(ends[1]) + 1]
+        steps = np.diff(near)
+        if len(steps) and steps.max() > max(BLIND, 3.0 / max(series.rate, 1.0)):
+            at = int(np.argmax(steps))
+            gaps.append((float(near[at]), float(near[at + 1])))
+    if not gaps:
+        return []
+    begin, end = min(gaps)[0], max(gap[1] for gap in gaps)
+    return [f"nothing is logged from {begin:.2f} to {end:.2f} s: what is seen after it may have begun in it"]
+
+
+def _limits_of_hover(steady: Steady | None, baseline: Baseline | None) -> list[str]:
+    if steady is None:
         return ["no steady hover (3 s, slow and level): a loss that was there from the beginning is not looked for; "
                 "hover for ten seconds"]  # fmt: skip
-    hidden = f"of less than {evidence.largest_hidden:.0%} of one rotor may pass for healthy"
+    least = steady.evidence.largest_hidden
+    hidden = (
+        f"a lasting loss of less than {least:.0%} of one rotor" if least < 1.0 else "any lasting loss of one rotor"
+    )
     if baseline is None or not baseline.trims:
-        return [f"no baseline: motors of a healthy vehicle may differ by 10 %, so a lasting loss {hidden}; "
+        return [f"no baseline: motors of a healthy vehicle may differ by 10 %, so {hidden} may pass for healthy; "
                 "give healthy flights with --baseline"]  # fmt: skip
-    return [f"a lasting loss {hidden}: healthy flights of this vehicle vary by as much"]
+    return [f"{hidden} may pass for healthy: healthy flights of this vehicle vary by as much"]
 
 
 def _nothing(log: Log, limits: list[str], motors: bool) -> LogDiagnosis:
     """The diagnosis of a log that does not fly, or has no commands."""
     why = "motors never carry the vehicle: there is no flight in it" if motors else "it has no commands of motors"
+    if log.layout is None:
+        why, motors = log.why or "where its motors are is not known", False
     causes = [Cause(name, None, None, None, share, why) for name, share in PRIOR.items() if name != "rotor loss"]
     motors_known = 0 if log.layout is None else len(log.layout.places)
     causes += [

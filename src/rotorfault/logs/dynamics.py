@@ -44,6 +44,7 @@ DEFAULT_LAG = 0.03  # s, where the log does not show it
 BAND = (1.0, 8.0)  # Hz, in which control moves the body more than wind does and noise is not yet the most
 CORRELATED = 0.5  # least correlation of demand and turn with which a gain is believed
 LONGEST = 20_000  # blocks that are looked at for gains
+STALE = 3.0  # periods of commands, beyond which the last one is not known to hold
 UPSET = 1.2  # rad of tilt, beyond which the model of hover ends
 LEAST_GAIN_ERROR = 0.1  # of a gain, however well it is known: thrust changes with airspeed and battery
 
@@ -121,7 +122,7 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     turn = blocks.turn / response.gain
     thrust = hover * blocks.force / G - command.mean(axis=1)
     values = np.column_stack([turn - demand, thrust])
-    values[_upset(log, blocks.edges)] = np.nan
+    values[_upset(log, blocks.edges) | _stale(log, blocks.edges)] = np.nan
     centred = demand - np.nanmedian(demand, axis=0)
     unsure = np.array([0.0, 0.0, LEAD]) + 0.3 * response.lag
     doubt = np.sqrt(
@@ -136,6 +137,14 @@ def residual_of(log: Log, begin: float, end: float, hover: float, known: Respons
     return Residual(
         blocks.edges[:-1], length, values, turn, np.column_stack([doubt, up]), command, patterns, response
     )
+
+
+def _stale(log: Log, edges: Array) -> NDArray[np.bool_]:
+    """Blocks before whose end no command was logged for long: what was asked for meanwhile is not known."""
+    command = log.series["command"]
+    last = command.time[np.clip(np.searchsorted(command.time, edges, side="right") - 1, 0, None)]
+    age = np.maximum(np.abs(edges - last)[1:], np.abs(edges - last)[:-1])
+    return np.asarray(age > max(STALE / max(command.rate, 1e-3), 2.0 * (edges[1] - edges[0])))
 
 
 def _upset(log: Log, edges: Array) -> NDArray[np.bool_]:
@@ -189,22 +198,15 @@ def _response(log: Log, begin: float, end: float, rows: Array, hover: float) -> 
     Noise of the gyro enters turn and, by control, demand; so the gain lies between that of regression, g, and
     g / r^2 with the correlation r. Its logarithm is taken as the middle of both, give or take half their distance.
     """
-    command, rates = log.series["command"], log.series["rates"]
     level, yaw = TURNS[4 if rows.shape[1] <= 4 else 6]
     prior = np.array([level, level, yaw])
     mean, sd = prior[:, 0] - math.log(hover), prior[:, 1]
-    length = max(0.02, 1.0 / max(command.rate, 1e-3), 1.0 / max(rates.rate, 1e-3)) * 1.001
-    fastest = min(BAND[1], 0.35 / length)
-    count = int(min((end - begin) / length, LONGEST))
     best, lag, known = np.zeros((2, 3)), DEFAULT_LAG, False
-    if fastest > 2.0 * BAND[0] and count > 200:
-        blocks = _blocks(log, np.asarray(begin + length * np.arange(count + 1), dtype=float))
-        band = butter(2, [2.0 * length * BAND[0], 2.0 * length * fastest], "band")
-        turn = _filtered(band, blocks.turn)
-        fits = [_fits(turn, _filtered(band, lagged(log, blocks.edges, one) @ rows.T)) for one in LAGS]
-        scores = [float(fit[1, :2].sum()) for fit in fits]
+    fits = answers(log, begin, end, rows)
+    if fits is not None:
+        scores = fits[:, 1, :2].sum(axis=1)
         k = int(np.argmax(scores))
-        known = scores[k] > 2.0 * CORRELATED
+        known = bool(scores[k] > 2.0 * CORRELATED)
         k = k if known else LAGS.index(DEFAULT_LAG)
         best, lag = fits[k], LAGS[k]
     gain, error = np.exp(mean), sd.copy()
@@ -217,6 +219,60 @@ def _response(log: Log, begin: float, end: float, rows: Array, hover: float) -> 
             gain[axis] = math.exp((weight * middle + mean[axis] * sd[axis] ** -2) / total)
             error[axis] = math.sqrt(1.0 / total)
     return Response(gain, np.maximum(error, LEAST_GAIN_ERROR), lag, known, hover)
+
+
+def chance(log: Log, begin: float, end: float) -> float:
+    """Standard deviation of a correlation of `answers` by chance: of 2 B T independent values in a band of width B.
+
+    Parameters
+    ----------
+    log : Log
+    begin, end : float, s
+    """
+    values = 2.0 * max(_band(log)[1] - BAND[0], 0.1) * min(end - begin, LONGEST * _band(log)[0])
+    return float(1.0 / math.sqrt(max(values, 1.0)))
+
+
+def _band(log: Log) -> tuple[float, float]:
+    """Length of a step in s, and the fastest frequency in Hz that it shows."""
+    command, rates = log.series["command"], log.series["rates"]
+    length = max(0.02, 1.0 / max(command.rate, 1e-3), 1.0 / max(rates.rate, 1e-3)) * 1.001
+    return length, min(BAND[1], 0.35 / length)
+
+
+def answers(log: Log, begin: float, end: float, rows: Array, most: float = math.inf) -> Array | None:
+    """How the body turns by what is asked for, in the band in which control moves it.
+
+    Parameters
+    ----------
+    log : Log
+    begin, end : float, s
+    rows : (3, N) ndarray
+        How each motor turns the body about roll, pitch and yaw.
+    most : float
+        Standard deviations to which both are cut before they are compared, so that a moment does not decide.
+
+    Returns
+    -------
+    (lags, 2, 3) ndarray or None
+        Slope and correlation about each axis with each of `LAGS`; None where the log is too slow or too short.
+    """
+    length, fastest = _band(log)
+    count = int(min((end - begin) / length, LONGEST))
+    if fastest <= 2.0 * BAND[0] or count <= 200:
+        return None
+    blocks = _blocks(log, np.asarray(begin + length * np.arange(count + 1), dtype=float))
+    band = butter(2, [2.0 * length * BAND[0], 2.0 * length * fastest], "band")
+    turn = _cut(_filtered(band, blocks.turn), most)
+    asked = (_cut(_filtered(band, lagged(log, blocks.edges, one) @ rows.T), most) for one in LAGS)
+    return np.array([_fits(turn, one) for one in asked])
+
+
+def _cut(values: Array, most: float) -> Array:
+    """Values within so many standard deviations of 0, by their median size."""
+    size = most * 1.4826 * np.maximum(np.median(np.abs(values), axis=0), 1e-12)
+    out: Array = np.clip(values, -size, size)
+    return out
 
 
 def _filtered(band: tuple[Array, Array], values: Array) -> Array:

@@ -6,13 +6,17 @@ quantity keeps the times at which it was logged, for logs have them at different
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Mapping
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotorfault.maths.arrays import Array
 from rotorfault.model.frames import FRAMES, place_of
+
+DAY = 86400.0  # s: no log pauses for longer
 
 
 class Series(NamedTuple):
@@ -77,6 +81,7 @@ class Note(NamedTuple):
     text: str
     alarm: bool = False  # whether it is the software's own verdict on a motor
     motor: int | None = None  # 1, 2, ... where it names one
+    stopped: bool = False  # whether it is what was sent to the motor: none of its thrust is left
 
 
 class Damage(NamedTuple):
@@ -109,13 +114,15 @@ class Log:
     damage : Damage
     remarks : tuple of str
         What was assumed in reading, in words.
+    why : str
+        Why there is no layout, in words; empty where there is one, or nothing is known of it.
 
     Notes
     -----
     Times are those of the log's own clock, in s.
     """
 
-    __slots__ = ("damage", "kind", "layout", "notes", "parameters", "remarks", "series", "source")
+    __slots__ = ("damage", "kind", "layout", "notes", "parameters", "remarks", "series", "source", "why")
 
     def __init__(
         self,
@@ -127,9 +134,19 @@ class Log:
         notes: tuple[Note, ...] = (),
         damage: Damage | None = None,
         remarks: tuple[str, ...] = (),
+        why: str = "",
     ) -> None:
-        self.source, self.kind, self.layout = source, kind, layout
-        self.series = {name: one for name, raw in series.items() if len((one := cleaned(raw)).time) > 1}
+        self.source, self.kind, self.layout, self.why = source, kind, layout, why
+        self.series: dict[str, Series] = {}
+        astray: dict[str, int] = {}
+        for name, raw in series.items():
+            one, left_out = cleaned(raw)
+            if len(one.time) > 1:
+                self.series[name] = one
+                astray |= {name: left_out} if left_out else {}
+        if astray:
+            said = ", ".join(f"{count} of {name}" for name, count in astray.items())
+            remarks = (*remarks, f"records whose time goes back or jumps by more than a day are left out: {said}")
         self.parameters = dict(parameters or {})
         self.notes, self.damage, self.remarks = notes, damage or Damage(), remarks
 
@@ -155,21 +172,55 @@ class Log:
         return float(max(b for _, b in ends) - min(a for a, _ in ends)) if ends else 0.0
 
 
-def cleaned(series: Series) -> Series:
-    """A series with finite values at increasing times alone; what is out of order is left out.
+def cleaned(series: Series) -> tuple[Series, int]:
+    """A series with finite values at increasing times alone, and how many records were left out for their times.
 
     Parameters
     ----------
     series : Series
+
+    Notes
+    -----
+    A clock that jumps once must not take the rest of the log along: of all ways to leave out records until times
+    increase, the one that leaves out the fewest is taken.
     """
     time = np.asarray(series.time, dtype=float)
     values = np.asarray(series.values, dtype=float).reshape(len(time), -1)
     good = np.isfinite(time) & np.isfinite(values).all(axis=1) & (np.abs(values) < 1e9).all(axis=1)
     time, values = time[good], values[good]
-    if len(time):
-        ahead = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
-        time, values = time[ahead], values[ahead]
-    return Series(time, values)
+    twice = np.concatenate([np.diff(time) == 0.0, [False]]) if len(time) else np.zeros(0, dtype=bool)
+    time, values = time[~twice], values[~twice]  # the same record again is no jump
+    whole = len(time)
+    if (np.diff(time) < 0.0).any():
+        kept = _increasing(time)
+        time, values = time[kept], values[kept]
+    breaks = np.flatnonzero(np.diff(time) > DAY)
+    if len(breaks):
+        edges = np.concatenate([[0], breaks + 1, [len(time)]])
+        k = int(np.argmax(np.diff(edges)))
+        time, values = time[edges[k] : edges[k + 1]], values[edges[k] : edges[k + 1]]
+    return Series(time, values), whole - len(time)
+
+
+def _increasing(time: Array) -> NDArray[np.intp]:
+    """Indices of a longest part of the times that increases."""
+    ends: list[float] = []  # least last time of an increasing part of each length
+    last: list[int] = []  # and its index
+    before = np.full(len(time), -1)
+    for k, one in enumerate(time.tolist()):
+        at = bisect.bisect_left(ends, one)
+        if at == len(ends):
+            ends.append(one)
+            last.append(k)
+        else:
+            ends[at], last[at] = one, k
+        before[k] = last[at - 1] if at else -1
+    kept = []
+    k = last[-1]
+    while k >= 0:
+        kept.append(k)
+        k = int(before[k])
+    return np.array(kept[::-1])
 
 
 def when(log: Log, time: float) -> str:

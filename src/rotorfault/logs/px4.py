@@ -8,10 +8,12 @@ Up to 1.12 the mixer's inputs are ``actuator_controls_0`` and its outputs pulses
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotorfault.logs.commands import mixed, share_of_pulse
 from rotorfault.logs.log import Damage, Layout, Log, Note, Series, named_layout
@@ -30,7 +32,18 @@ WANTED = dict.fromkeys(
 )  # fmt: skip
 FLIP = np.array([1.0, -1.0, -1.0])  # from forward, right, down to forward, left, up
 FRAMES_BY_TYPE = {2: "quad-x", 13: "hexa-x", 14: "octa-x"}  # MAV_TYPE: PX4's generic frame of so many motors
-PLUS = {5001: "quad-plus", 7001: "hexa-plus", 9001: "octa-plus"}
+OTHER_TYPES = {
+    1: "an aeroplane", 3: "a coaxial helicopter", 4: "a helicopter", 7: "an airship", 8: "a balloon", 10: "a rover",
+    11: "a boat", 12: "a submarine", 15: "a tricopter with a servo", **dict.fromkeys(range(19, 26), "a VTOL"),
+}  # fmt: skip
+# SYS_AUTOSTART: airframes of PX4 are numbered by kind, a thousand each.
+AIRFRAMES = {
+    4: "quad-x", 5: "quad-plus", 6: "hexa-x", 7: "hexa-plus", 8: "octa-x", 9: "octa-plus", 11: "y6b",
+    12: "octaquad-x",
+}  # fmt: skip
+FIRST_FUNCTION = 101  # ACTUATOR_FUNCTION of motor 1
+MOST_ESCS = 8  # that a log has fields for in all versions
+LIFTING = 0.5  # least share of a rotor's thrust that has to point up: cosine of 60 degrees
 
 
 def read_px4_log(path: Path) -> Log:
@@ -47,10 +60,11 @@ def read_px4_log(path: Path) -> Log:
     """
     file = read_ulog(path, WANTED)
     remarks: list[str] = []
-    layout = _layout(file)
+    layout, why = _layout(file)
     series = {name: one for name, one in _motion(file) if one is not None}
     series |= _commands(file, layout, remarks)
-    series |= _power(file)
+    count = 0 if layout is None else len(layout.places)
+    series |= _power(file, count) if count else {}
     if layout is not None and layout.assumed:
         remarks.append(f"motor places are assumed: {layout.source}")
     generation = (
@@ -62,14 +76,18 @@ def read_px4_log(path: Path) -> Log:
         if topic.rows.every > 1:
             remarks.append(f"{topic.name}: one of {topic.rows.every} records is used, the log being long")
     kind = f"PX4 ULog with {generation}"
-    return Log(path.name, kind, layout, series, file.parameters, _notes(file), damage, tuple(remarks))
+    return Log(path.name, kind, layout, series, file.parameters, _notes(file, count), damage, tuple(remarks), why)
 
 
 def _series(file: ULogFile, name: str, fields: Sequence[str], scale: Array | float = 1.0) -> Series | None:
-    """Some fields of a topic's first instance that has them."""
-    for instance in range(4):
-        topic = file.topics.get((name, instance))
-        if topic is not None and len(topic.rows) and _has(topic, fields):
+    """Some fields of a topic: of its instances the first that has about as many records as any."""
+    having = [
+        topic for instance in range(4)
+        if (topic := file.topics.get((name, instance))) is not None and len(topic.rows) and _has(topic, fields)
+    ]  # fmt: skip
+    most = max((len(topic.rows) * topic.rows.every for topic in having), default=0)
+    for topic in having:
+        if 2 * len(topic.rows) * topic.rows.every >= most:
             table = topic.rows.table()
             with np.errstate(invalid="ignore", over="ignore"):
                 values = np.column_stack([table[field].astype(float) for field in fields]) * scale
@@ -107,38 +125,70 @@ def _motion(file: ULogFile) -> list[tuple[str, Series | None]]:
     ]  # fmt: skip
 
 
-def _power(file: ULogFile) -> dict[str, Series]:
-    found = {
-        "battery": _series(file, "battery_status", ("voltage_v", "current_a")),
-        "rpm": _series(file, "esc_status", [f"esc[{k}].esc_rpm" for k in range(8)]),
-        "current": _series(file, "esc_status", [f"esc[{k}].esc_current" for k in range(8)]),
-    }
+def _power(file: ULogFile, count: int) -> dict[str, Series]:
+    found = {"battery": _series(file, "battery_status", ("voltage_v", "current_a"))}
+    order = _escs(file, count)
+    if order:
+        found["rpm"] = _series(file, "esc_status", [f"esc[{k}].esc_rpm" for k in order])
+        found["current"] = _series(file, "esc_status", [f"esc[{k}].esc_current" for k in order])
     return {name: one for name, one in found.items() if one is not None}
 
 
-def _layout(file: ULogFile) -> Layout | None:
-    """Geometry by parameters, else the generic frame of the vehicle's type."""
+def _escs(file: ULogFile, count: int) -> list[int]:
+    """Which ESC each motor has: by their functions where these are logged, else in their order."""
+    functions = _series(file, "esc_status", [f"esc[{k}].actuator_function" for k in range(MOST_ESCS)])
+    if functions is not None and len(functions.values):
+        last = functions.values[-1].astype(int).tolist()
+        wanted = [FIRST_FUNCTION + k for k in range(count)]
+        if all(one in last for one in wanted):
+            return [last.index(one) for one in wanted]
+        if any(last):
+            return []
+    return list(range(count))
+
+
+def _layout(file: ULogFile) -> tuple[Layout | None, str]:
+    """Geometry by parameters, else the generic frame of the airframe or the type; and why there is none."""
     parameters = file.parameters
+    kind, start = parameters.get("MAV_TYPE", 0.0), parameters.get("SYS_AUTOSTART", 0.0)
+    if kind in OTHER_TYPES:
+        return None, f"MAV_TYPE is {kind:.0f}, {OTHER_TYPES[int(kind)]}: only multirotors can be diagnosed"
     count = parameters.get("CA_ROTOR_COUNT", 0.0)
-    if 3 <= count <= MOST_ROTORS and parameters.get("SYS_CTRL_ALLOC", 1.0):
-        rows = [
-            (parameters.get(f"CA_ROTOR{k}_PX", 0.0), -parameters.get(f"CA_ROTOR{k}_PY", 0.0))
-            for k in range(int(count))
-        ]
-        places, turns = np.array(rows), [parameters.get(f"CA_ROTOR{k}_KM", 0.05) for k in range(int(count))]
-        longest = float(np.hypot(*places.T).max())
-        if np.isfinite(places).all() and 1e-3 < longest < 1e3:
-            return Layout(places / longest, np.where(np.array(turns) > 0.0, -1.0, 1.0), "CA_ROTOR parameters")
-    start = parameters.get("SYS_AUTOSTART", 0.0)
-    if start in PLUS:
-        return named_layout(PLUS[int(start)], f"SYS_AUTOSTART {start:.0f}")
-    kind = parameters.get("MAV_TYPE")
-    frame = FRAMES_BY_TYPE.get(int(kind)) if kind is not None and np.isfinite(kind) else None
+    if count > 0.0 and parameters.get("SYS_CTRL_ALLOC", 1.0):
+        if not 3 <= count <= MOST_ROTORS:
+            return None, f"CA_ROTOR_COUNT is {count:.0f}: only multirotors of 3 to {MOST_ROTORS} can be diagnosed"
+        return _by_parameters(parameters, int(count))
+    frame = AIRFRAMES.get(int(start) // 1000) if np.isfinite(start) else None
     if frame is not None:
-        return named_layout(frame, f"PX4's generic {frame}, for MAV_TYPE is {kind:.0f}", assumed=True)
+        assumed = int(start) % 1000 > 1  # not the generic one, whose geometry is known
+        return named_layout(frame, f"{frame}, for SYS_AUTOSTART is {start:.0f}", assumed), ""
+    frame = FRAMES_BY_TYPE.get(int(kind)) if np.isfinite(kind) else None
+    if frame is not None:
+        return named_layout(frame, f"PX4's generic {frame}, for MAV_TYPE is {kind:.0f}", assumed=True), ""
     if file.topics:
-        return named_layout("quad-x", "PX4's generic quad-x; the log does not name its type", assumed=True)
-    return None
+        return named_layout("quad-x", "PX4's generic quad-x; the log does not name its type", assumed=True), ""
+    return None, ""
+
+
+def _by_parameters(parameters: Mapping[str, float], count: int) -> tuple[Layout | None, str]:
+    """Where CA_ROTOR* have the rotors."""
+
+    def of(word: str, default: float) -> Array:
+        return np.array([parameters.get(f"CA_ROTOR{k}_{word}", default) for k in range(count)])
+
+    axes = np.column_stack([of("AX", 0.0), of("AY", 0.0), of("AZ", -1.0)])
+    places, turns = np.column_stack([of("PX", 0.0), -of("PY", 0.0)]), of("KM", 0.05)
+    if not np.isfinite(np.hstack([axes, places, turns[:, None]])).all():
+        return None, "CA_ROTOR parameters are no numbers"
+    lift = -axes[:, 2] / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)
+    if lift.min() < LIFTING:
+        weak = int(np.argmin(lift)) + 1
+        return None, f"CA_ROTOR{weak - 1} does not pull up: only multirotors can be diagnosed"
+    longest = float(np.hypot(*places.T).max())
+    if not 1e-3 < longest < 1e3:
+        return None, "CA_ROTOR parameters put all rotors at one place"
+    yaw = np.where(turns > 0.0, -1.0, np.where(turns < 0.0, 1.0, 0.0))
+    return Layout(places / longest, yaw, "CA_ROTOR parameters"), ""
 
 
 def _commands(file: ULogFile, layout: Layout | None, remarks: list[str]) -> dict[str, Series]:
@@ -149,13 +199,15 @@ def _commands(file: ULogFile, layout: Layout | None, remarks: list[str]) -> dict
     count = len(layout.places)
     output = _output(file, count)
     asked = _asked(file, layout)
+    if output is not None and output.stopped.any():
+        remarks.append("a motor that is stopped (no number) is taken as asked for as much as the others in the mean")
     if output is not None:
-        found["output"] = output
-    if asked is not None and (output is None or asked.rate >= output.rate or count == 4):
+        found["output"] = output.sent
+    if asked is not None and (output is None or asked.rate >= output.sent.rate or count == 4):
         found["command"] = asked
         remarks.append("commands are rebuilt from set-points of torque and thrust")
     elif output is not None:
-        found["command"] = output
+        found["command"] = output.asked
         remarks.append("commands are those logged of the motors")
     return found
 
@@ -172,7 +224,7 @@ def _asked(file: ULogFile, layout: Layout) -> Series | None:
     if controls is None:
         return None
     values = controls.values
-    return Series(controls.time, mixed(layout, values[:, :3] * FLIP, values[:, 3], "px4"))
+    return Series(controls.time, mixed(layout, values[:, :3] * FLIP, values[:, 3], "px4 mixer"))
 
 
 def _finite(series: Series) -> tuple[Array, Array]:
@@ -181,10 +233,37 @@ def _finite(series: Series) -> tuple[Array, Array]:
     return series.time[good][order], series.values[good][order]
 
 
-def _output(file: ULogFile, count: int) -> Series | None:
-    """What was sent to the motors, as shares of thrust; a motor that is stopped has 0."""
-    if (motors := _series(file, "actuator_motors", _indexed("control", min(count, 12)))) is not None:
-        return Series(motors.time, np.nan_to_num(motors.values, nan=0.0))
+class _Output(NamedTuple):
+    """What was sent to the motors, as shares of thrust."""
+
+    sent: Series  # 0 where a motor is stopped
+    stopped: NDArray[np.bool_]  # (n, N) while others run
+
+    @property
+    def asked(self) -> Series:
+        """The same, with the mean of the others where a motor is stopped: it is no longer asked."""
+        values = self.sent.values.copy()
+        running = np.maximum((~self.stopped).sum(axis=1), 1)
+        mean = np.where(self.stopped, 0.0, values).sum(axis=1) / running
+        values[self.stopped] = np.repeat(mean[:, None], values.shape[1], axis=1)[self.stopped]
+        return Series(self.sent.time, values)
+
+
+def _stopped(file: ULogFile, count: int) -> _Output | None:
+    """`actuator_motors`, in which a motor without a number is stopped."""
+    motors = _series(file, "actuator_motors", _indexed("control", min(count, 12))) if count else None
+    if motors is None:
+        return None
+    none = ~np.isfinite(motors.values)
+    running = np.nan_to_num(motors.values, nan=0.0) > 0.0
+    stopped = none & running.any(axis=1, keepdims=True)
+    return _Output(Series(motors.time, np.where(none, 0.0, motors.values)), stopped)
+
+
+def _output(file: ULogFile, count: int) -> _Output | None:
+    """What was sent to the motors: as thrust where that is logged, else by their pulses."""
+    if (motors := _stopped(file, count)) is not None:
+        return motors
     best: Series | None = None
     for instance in range(4):  # of the output drivers, the one whose channels move like motors
         topic = file.topics.get(("actuator_outputs", instance))
@@ -206,11 +285,18 @@ def _output(file: ULogFile, count: int) -> Series | None:
     else:
         signal = share_of_pulse(best.values, low, high)
     curve = min(max(file.parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
-    return Series(best.time, share_of(signal, curve))
+    sent = Series(best.time, share_of(signal, curve))
+    return _Output(sent, np.zeros(sent.values.shape, dtype=bool))
 
 
-def _notes(file: ULogFile) -> tuple[Note, ...]:
+def _notes(file: ULogFile, count: int) -> tuple[Note, ...]:
     notes = [Note(time * 1e-6, text) for time, text in file.texts]
+    if (motors := _stopped(file, count)) is not None:
+        twice = motors.stopped[:-1] & motors.stopped[1:]
+        for k in np.flatnonzero(twice.any(axis=0)):
+            begin = float(motors.sent.time[int(np.argmax(twice[:, k]))])
+            text = f"motor {k + 1} is stopped by the allocation, others run"
+            notes.append(Note(begin, text, True, int(k) + 1, True))
     for mask_name in ("motor_failure_mask", "fd_motor"):
         status = _series(file, "failure_detector_status", (mask_name,))
         if status is None or not (on := status.values[:, 0] > 0.5).any():

@@ -8,6 +8,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.logs.ardupilot import read_ardupilot_log
 from rotorfault.logs.dataflash import HEAD as DATAFLASH
 from rotorfault.logs.log import Log
+from rotorfault.logs.numbering import numbered
 from rotorfault.logs.px4 import read_px4_log
 from rotorfault.logs.recorded import read_recorded_log
 from rotorfault.logs.stream import content, inner_suffix
@@ -55,11 +56,11 @@ def read_log(path: str | Path) -> Log:
     if head.startswith(NETCDF) or suffix == ".npz":
         if packed:
             raise InputError(f"{path}: is gzipped, though such a file is packed already; unpack it and give that")
-        return read_recorded_log(path) if head.startswith(NETCDF) else read_table_log(path)
+        return read_recorded_log(path) if head.startswith(NETCDF) else numbered(read_table_log(path))
     if head[:2] == DATAFLASH or (suffix == ".bin" and DATAFLASH in head):
         return read_ardupilot_log(path)
     if is_text(head) and (suffix == ".csv" or b"," in head[:2000]):
-        return read_table_log(path)
+        return numbered(read_table_log(path))
     what = "is empty" if not head else "is no flight log that is known"
     raise InputError(f"{path}: {what}; allowed: {FORMATS}")
 

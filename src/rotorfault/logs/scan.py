@@ -29,7 +29,7 @@ LOSSES = np.array([0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
 REFERENCE, GUARD = 20.0, 1.0  # s whose mean a residual is weighed against, and s between them
 FIRST = 3.0  # s at least before anything is said
 SETTLED, CALM = 1.0, 0.1  # s after an onset until commands have settled, and turn in units of command that is calm
-SIDE, LIKE = 5.0, 4.0  # s on each side of an onset that tell its noise; by how much more it may be behind it
+SIDE, LIKE = FIRST, 4.0  # s on each side of an onset that tell its noise; by how much more it may be behind it
 LASTING, PASSING = 0.05, 8  # loss below which what was found has passed, and how often that is looked for
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)  # s of sums by which the noise is measured
@@ -112,15 +112,16 @@ def _levelled(rho: Array, begin: int, block: float) -> Array:
     """
     least = int(SIDE / block)
     before, after = rho[:begin], rho[begin + int(SETTLED / block) :]
-    if np.isfinite(before[:, :3]).all(axis=1).sum() < least:
-        return rho
+    short = np.isfinite(before[:, :3]).all(axis=1).sum() < least
     if np.isfinite(after[:, :3]).all(axis=1).sum() < least:
-        return before
+        return rho if short else before
     with np.errstate(all="ignore"):
         used = np.isfinite(after).any(axis=0)
         level = np.zeros(rho.shape[1])
         level[used] = np.nanmedian(after[:, used], axis=0)
         after = after - level
+        if short:  # little was logged before: what follows tells the noise, and tells too much where it is a crash
+            return np.vstack([before, after])
         calm = np.nanmedian(np.abs(after[:, :3]), axis=0) < LIKE * np.nanmedian(np.abs(before[:, :3]), axis=0)
     return np.vstack([before, after]) if calm.all() else before
 

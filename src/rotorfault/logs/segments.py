@@ -18,6 +18,7 @@ IDLE = 0.05  # command below which a motor idles
 BLOCK = 1.0  # s of a block of hover
 SETTLING, LANDING = 2.0, 1.0  # s after take-off and before landing, in which the ground is near
 BRIDGED, SHORTEST, LIFTED = 1.0, 3.0, 0.15  # s of a gap in a flight, s of a flight, m that it leaves the ground
+UNSEEN = 5.0  # s without records, in which nobody lands and takes off again: the flight goes on
 MOST_FLIGHTS = 200  # of a log
 SLOW, CLIMB, TURN = 0.7, 0.25, 0.25  # m/s, m/s, rad/s: beyond them drag and gyroscopic torque enter the trim
 CHANGE = 0.4  # m/s: change of speed over a block
@@ -51,12 +52,15 @@ def flight_spans(log: Log) -> list[tuple[float, float]]:
         up &= landed.at(command.time)[:, 0] < 0.5
     if (position := log.series.get("position")) is not None:
         height = position.values[:, 2]
-        if np.ptp(height) < LIFTED and abs(float(np.median(height))) < 2.0 * LIFTED:
+        known = np.ptp(height) > 0.0  # what never changes is not estimated
+        if known and np.ptp(height) < LIFTED and abs(float(np.median(height))) < 2.0 * LIFTED:
             return []  # it never leaves the ground
     at = command.time[up]
     if not len(at):
         return []
-    breaks = np.flatnonzero(np.diff(at) > BRIDGED)
+    seen = np.diff(np.flatnonzero(up)) > 1  # records between, that are no flight
+    gaps = np.diff(at)
+    breaks = np.flatnonzero((seen & (gaps > BRIDGED)) | (gaps > UNSEEN))
     starts, ends = at[np.concatenate([[0], breaks + 1])], at[np.concatenate([breaks, [len(at) - 1]])]
     return [(float(a), float(b)) for a, b in zip(starts, ends, strict=True) if b - a > SHORTEST][:MOST_FLIGHTS]
 

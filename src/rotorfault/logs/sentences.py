@@ -51,7 +51,7 @@ def sudden_evidence(log: Log, scan: Scan, rotor: int) -> str:
     return "; ".join(said)
 
 
-def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim | None, known: bool) -> str:
+def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim | None, against: str) -> str:
     """What hover says of a cause.
 
     Parameters
@@ -62,10 +62,9 @@ def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim |
         Index, where it is a rotor.
     evidence : Evidence
     trim : Trim or None
-    known : bool
-        Whether there is a baseline.
+    against : str
+        What it is compared with, in words.
     """
-    against = "its baseline" if known else "an even share"
     if rotor is not None:
         others = np.delete(evidence.deviation, rotor)
         return (

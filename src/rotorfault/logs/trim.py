@@ -117,7 +117,9 @@ def spread_of(layout: Layout, trims: Sequence[Trim]) -> Spread:
     return Spread(basis, mean, np.sqrt(variance * (1.0 + 1.0 / count)), WORTH + count - 1.0)
 
 
-def weigh(layout: Layout, trim: Trim, spread: Spread, names: Sequence[str], sagged: float | None = None) -> Evidence:
+def weigh(
+    layout: Layout, trim: Trim, spread: Spread, names: Sequence[str], sagged: float | None = None, flights: int = 1
+) -> Evidence:
     """Probabilities of causes of a trim.
 
     Parameters
@@ -129,6 +131,8 @@ def weigh(layout: Layout, trim: Trim, spread: Spread, names: Sequence[str], sagg
         Of the directions.
     sagged : float, optional
         Relative drop of the battery's voltage against the baseline's, where it is known.
+    flights : int
+        Among which this one was looked for: a cause has begun in each as likely as in any other.
     """
     basis, count = spread.basis, len(trim.log_command)
     alone = not np.isfinite(spread.mean).all()
@@ -170,7 +174,10 @@ def weigh(layout: Layout, trim: Trim, spread: Spread, names: Sequence[str], sagg
     ratios |= {(name, None): likelihood(shifts) for name, shifts in others.items()}
     most = max(ratios.values())
     weights = {
-        key: math.exp(value - most) * PRIOR[key[0]] / (count if key[0] == "rotor loss" else 1)
+        key: math.exp(value - most)
+        * PRIOR[key[0]]
+        / (count if key[0] == "rotor loss" else 1)
+        / (flights if key[0] != "healthy" else 1)
         for key, value in ratios.items()
     }
     total = sum(weights.values())
