@@ -44,3 +44,15 @@ def test_a_log_is_flown_again_with_its_fault(tmp_path: Path) -> None:
     assert fault["loss"] == pytest.approx(0.3, abs=0.04)
     assert fault["time"] == pytest.approx(20.0, abs=0.15)
     assert scenario.duration == pytest.approx(25.0, abs=0.2)
+
+
+def test_a_lasting_loss_is_flown_where_healthy_logs_show_it(tmp_path: Path) -> None:
+    uneven = (0.12, -0.1, 0.03, -0.05)
+    healthy = [write_csv(flown(seed=k, seconds=10.0, imbalance=uneven), tmp_path / f"{k}.csv") for k in range(3)]
+    weak = flown(seed=9, seconds=10.0, imbalance=uneven, rotor=3, loss=0.25, onset=-1.0)
+    path = write_csv(weak, tmp_path / "weak.csv")
+    assert like(path, tmp_path, {"controller.preset": "midsize"}).settings["fault"] == []
+    (fault,) = like(path, tmp_path, {"controller.preset": "midsize"}, healthy).settings["fault"]
+    assert fault["rotor"] == 4
+    assert fault["time"] == 0.0
+    assert fault["loss"] == pytest.approx(0.25, abs=0.05)

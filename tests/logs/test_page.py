@@ -30,8 +30,10 @@ def test_a_page_has_the_verdict_and_the_evidence_against_each_rotor(tmp_path: Pa
     (path,) = write_pages([found], tmp_path)
     text = path.read_text(encoding="utf-8")
     assert path.name == "my-flight.html"
-    assert "rotor 3 (front left) lost about 50%" in text
-    assert all(f"evidence_against_rotor_{k}" in text for k in range(1, 5))
+    assert "rotor 3 (front left) lost about 50 %" in text
+    assert "evidence_against_rotors" in text
+    assert found.probable.evidence in text  # whole, however long
+    assert "desired path" not in text  # a log has none, so nothing is drawn that would need a legend
 
 
 def test_belief_follows_evidence_and_both_begin_with_the_loss() -> None:
@@ -39,8 +41,11 @@ def test_belief_follows_evidence_and_both_begin_with_the_loss() -> None:
     time, belief = data["time"].values, data["diagnosis.belief"].values
     assert belief[time < 19.0].max() < 0.01
     assert belief[(time > 20.5) & (time < 23.0), 2].min() > 0.95
-    evidence = data["diagnosis.evidence_against_rotor_3"].values
-    assert (evidence[time < 19.0, 0] < evidence[time < 19.0, 1]).all()
+    evidence = data["diagnosis.evidence_against_rotors"].values
+    assert list(data["against"].values) == ["rotor 1", "rotor 2", "rotor 3", "rotor 4", "an alarm"]
+    assert (evidence[time < 19.0, :4] < evidence[time < 19.0, 4:]).all()
+    late = evidence[(time > 20.5) & (time < 23.0)]
+    assert (late[:, 2] > late[:, 4]).all()
 
 
 def test_registered_sources_name_the_motors_of_the_log() -> None:
@@ -49,6 +54,10 @@ def test_registered_sources_name_the_motors_of_the_log() -> None:
     (said,) = [one for one in found.detectors if one.detector == "luenberger"]
     assert [rotor for rotor, time, _ in said.flags if time > 29.0][:1] == [2]
     assert found.json()["detectors"]
+    assert "registered sources flag it too" in found.probable.evidence
+    assert "luenberger flags rotor 2 from" in str(found)
+    alone = diagnosis_of(log)  # they count as no further evidence: the records are the same
+    assert [one.probability for one in alone.causes] == [one.probability for one in found.causes]
 
 
 def test_a_vehicle_whose_motors_are_elsewhere_is_refused() -> None:

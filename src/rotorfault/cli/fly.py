@@ -44,6 +44,13 @@ def fly(
         Path | None,
         typer.Option(metavar="LOG", help="Fly what this log shows: its path, wind and fault; the page has both."),
     ] = None,
+    baseline: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="LOG",
+            help="With --like: a healthy flight of the same vehicle, or a file of 'rotorfault baseline'.",
+        ),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Write the flight's page as well: flight.html.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the flight in the terminal while it is flown.")] = False,
     live_speed: Annotated[
@@ -78,8 +85,10 @@ def fly(
                 "--like makes the scenario of the log; give it without a scenario, --seed or --allow-code"
             )
         settings = parse_overrides(assignments or [])
-        _like(like, controller, preset, settings, engine, out, figures, watched)
+        _like(like, baseline or [], controller, preset, settings, engine, out, figures, watched)
         return
+    if baseline:
+        raise InputError("--baseline is for the log of --like; give both")
     if scenario is None:
         raise InputError("no scenario was given; try 'rotorfault fly paper-set-point' or see 'rotorfault list'")
     settings = parse_overrides(assignments or [])
@@ -95,6 +104,7 @@ def fly(
 
 def _like(
     log: Path,
+    baseline: list[Path],
     controller: str | None,
     preset: str | None,
     settings: dict[str, object],
@@ -109,7 +119,7 @@ def _like(
     from rotorfault.logs.flown_again import like, write_both
 
     with made_folder(out or Path("results") / file_name(f"like-{log.stem}")) as folder:
-        made = like(log, folder, settings)
+        made = like(log, folder, settings, baseline)
         named = {} if preset is None else {"controller.preset": preset}
         checked = prepare("hover-fault", controller, {**named, **made.settings}, None)
         say("\n".join([*made.notes, ""]))

@@ -12,6 +12,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.logs.baseline import Baseline, digest_of, is_baseline, learned, read_baseline
 from rotorfault.logs.diagnose import diagnosis_of
+from rotorfault.logs.log import Log
 from rotorfault.logs.page import page_name, write_diagnosis
 from rotorfault.logs.read import read_log
 from rotorfault.logs.verdict import LogDiagnosis
@@ -133,12 +134,28 @@ def diagnosed(path: Path, baseline: Baseline | None, vehicle: str | Path | None 
         If it cannot be read, or the baseline is of another vehicle.
     """
     log = read_log(path)
+    return diagnosis_of(log, baseline_for(log, baseline), vehicle)
+
+
+def baseline_for(log: Log, baseline: Baseline | None) -> Baseline | None:
+    """A baseline, if it can be one of a log's vehicle.
+
+    Parameters
+    ----------
+    log : Log
+    baseline : Baseline or None
+
+    Raises
+    ------
+    InputError
+        If its vehicle has not as many motors.
+    """
     if baseline is not None and log.layout is not None and len(log.layout.places) != len(baseline.layout.places):
         raise InputError(
-            f"{path}: has {len(log.layout.places)} motors, its baseline {len(baseline.layout.places)}; give a "
+            f"{log.source}: has {len(log.layout.places)} motors, its baseline {len(baseline.layout.places)}; give a "
             "baseline of the same vehicle"
         )
-    return diagnosis_of(log, baseline, vehicle)
+    return baseline
 
 
 def write_pages(found: Sequence[LogDiagnosis], folder: Path, vehicle: str | Path | None = None) -> list[Path]:

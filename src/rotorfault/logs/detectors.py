@@ -2,7 +2,8 @@
 
 A source needs a vehicle: mass, inertia, rotors. Commands become newton by what they are in the log's own hover, each
 motor's for itself, so that an uneven vehicle begins with no residual. What a source says is told beside the ranked
-causes and enters no probability: it knows no baseline and no alternatives.
+causes, and whether it is the same. It enters no probability: it looks at the same records, which are weighed already,
+and knows no baseline and no alternatives.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from rotorfault.logs.dynamics import Residual, Response, block_length, residual_
 from rotorfault.logs.log import Log, Note, when
 from rotorfault.logs.scan import FIRST, Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
-from rotorfault.logs.sentences import own_words, sudden_evidence, trim_evidence, verdict_of
+from rotorfault.logs.sentences import own_words, seconded, sudden_evidence, trim_evidence, verdict_of
 from rotorfault.logs.steady import Steady, steady_of
 from rotorfault.logs.trim import PRIOR
 from rotorfault.logs.verdict import Cause, LogDiagnosis
@@ -81,10 +81,10 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
     if vehicle is not None:
         span = max(spans, key=lambda one: one[1] - one[0])
         said = said_by_all(log, (span[0] + TAKE_OFF, span[1]), before, vehicle)
-    return LogDiagnosis(
-        log, causes, verdict_of(log, causes, evidence), tuple(limits), tuple(one.scan for one in sudden), evidence,
-        own_words(log), tuple(said),
-    )  # fmt: skip
+        causes = (seconded(causes[0], said), *causes[1:])
+    verdict = verdict_of(log, causes, evidence, None if steady is None else steady.trim)
+    scans = tuple(one.scan for one in sudden)
+    return LogDiagnosis(log, causes, verdict, tuple(limits), scans, evidence, own_words(log), tuple(said))
 
 
 def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known: Response | None) -> list[Sudden]:

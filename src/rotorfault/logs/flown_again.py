@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from rotorfault.base.csv_text import write_columns
 from rotorfault.base.errors import InputError
 from rotorfault.flight.flight import Flight
+from rotorfault.logs.api import baseline_for, baseline_of
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log
@@ -39,7 +40,7 @@ class Likeness(NamedTuple):
     notes: tuple[str, ...]  # what was taken, a line each
 
 
-def like(path: str | Path, folder: Path, settings: Mapping[str, Any]) -> Likeness:
+def like(path: str | Path, folder: Path, settings: Mapping[str, Any], baseline: Sequence[Path] = ()) -> Likeness:
     """The scenario of a log: reference, wind, faults.
 
     Parameters
@@ -50,6 +51,8 @@ def like(path: str | Path, folder: Path, settings: Mapping[str, Any]) -> Likenes
         Where the table of the reference is written.
     settings : mapping
         What the user sets; ``vehicle`` says which is flown.
+    baseline : sequence of Path
+        Healthy logs of the same vehicle, or a file of ``rotorfault baseline``: a lasting loss shows against them.
 
     Raises
     ------
@@ -62,7 +65,7 @@ def like(path: str | Path, folder: Path, settings: Mapping[str, Any]) -> Likenes
     spans = flight_spans(log)
     if not spans:
         raise InputError(f"{log.source}: motors never carry the vehicle: there is no flight in it")
-    found = diagnosis_of(log)
+    found = diagnosis_of(log, baseline_for(log, baseline_of(baseline)))
     name = settings.get("vehicle", USUAL.get(log.kind, "x500"))
     vehicle = load_vehicle(name) if isinstance(name, (str, Path)) else None
     if vehicle is None:

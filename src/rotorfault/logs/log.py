@@ -231,5 +231,5 @@ def when(log: Log, time: float) -> str:
     log : Log
     time : float, s
     """
-    into = time - log.start
-    return f"t = {time:.2f} s" + (f" ({into:.2f} s into the log)" if log.start > 0.5 else "")
+    into = f", {time - log.start:.2f} s into the log" if log.start > 0.5 else ""
+    return f"t = {time:.2f} s{into}"

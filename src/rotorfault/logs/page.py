@@ -177,7 +177,7 @@ def data_of(found: LogDiagnosis, file: VehicleFile | None = None, zero: float | 
         "angle": np.array(ANGLES),
         "component": np.array(["w", "x", "y", "z"]),
         "rotor": np.arange(1, max(log.motors, 1) + 1),
-        "against": np.array(["evidence", "an alarm"]),
+        "against": np.array([*(f"rotor {k + 1}" for k in range(log.motors)), "an alarm"]),
         "channel": np.array(["roll", "pitch", "yaw", "thrust"]),
     }
     said = {"time": {"units": "s", "long_name": "time since the first record"}}
@@ -214,14 +214,9 @@ def _evidence(scans: tuple[Scan, ...], clock: Array, motors: int) -> dict[str, V
         odds = np.exp(logs - most)
         belief[inside] = odds / (np.exp(-most) + odds.sum(axis=1, keepdims=True))
         residual[inside] = scan.residual[rows]
-    found = {}
-    for k in range(motors):
-        both = np.column_stack([evidence[:, k], np.full(len(clock), scans[0].threshold)])
-        about = {
-            "units": "1",
-            "long_name": f"logarithm of likelihood that rotor {k + 1} lost thrust over that of none",
-        }
-        found[f"diagnosis.evidence_against_rotor_{k + 1}"] = Variable(("time", "against"), both, about)
+    alarm = np.full((len(clock), 1), scans[0].threshold)
+    about = {"units": "1", "long_name": "logarithm of likelihood that a rotor lost thrust over that of none did"}
+    found = {"diagnosis.evidence_against_rotors": Variable(("time", "against"), np.hstack([evidence, alarm]), about)}
     about = {"units": "1", "long_name": "probability of a sudden loss of each rotor, by its evidence alone"}
     found["diagnosis.belief"] = Variable(("time", "rotor"), belief, about)
     about = {"units": "1", "long_name": "what commands do not explain of the motion, in units of command"}

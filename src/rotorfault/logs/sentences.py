@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from rotorfault.logs.detectors import Said
+from rotorfault.logs.dynamics import G
 from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence, Trim
 from rotorfault.logs.verdict import Cause, likely
+
+# 1/s, drag over mass: mean of its logarithm and standard deviation, of the built-in vehicles (0.12 to 0.45).
+DRAG = (math.log(0.23), 0.45)
+LEANS = math.radians(0.5)  # below which a lean is that of an estimate
+NAMED = {"healthy": "a sound vehicle", "centre of mass shifted": "a shifted centre of mass"}
+SIDES = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
+
+
+def wind_words(trim: Trim | None) -> str:
+    """The wind that a vehicle leans against in hover, by what vehicles have of drag; empty where it does not lean.
+
+    Parameters
+    ----------
+    trim : Trim or None
+    """
+    if trim is None or not np.isfinite(trim.tilt).all():
+        return ""
+    forward, left = trim.tilt
+    lean = math.asin(min(math.hypot(forward, left), 1.0))
+    if lean < LEANS:
+        return ""
+    side = SIDES[round(math.atan2(left, forward) / (math.pi / 4.0)) % 8]
+    speeds = [G * math.tan(lean) / math.exp(DRAG[0] + k * 1.645 * DRAG[1]) for k in (1.0, 0.0, -1.0)]
+    return f"of {speeds[1]:.0f} m/s ({speeds[0]:.0f} to {speeds[2]:.0f}) from the {side}"
 
 
 def rotor_words(log: Log, rotor: int) -> str:
@@ -73,7 +100,7 @@ def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim |
         )
     if name == "healthy":
         most = int(np.argmax(np.abs(evidence.sigmas)))
-        return f"no motor is off {against} by more than {abs(evidence.sigmas[most]):.1f} sigma (motor {most + 1})"
+        return f"furthest off {against} is motor {most + 1}, by {abs(evidence.sigmas[most]):.1f} sigma"
     share = evidence.explained.get(name)
     said = "" if share is None else f"would explain {share:.0%} of the change of trim"
     if name == "battery sag" and trim is not None and np.isfinite(trim.voltage):
@@ -82,7 +109,31 @@ def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim |
         tilt = None if trim is None or not np.isfinite(trim.tilt).all() else trim.tilt
         size = None if tilt is None else np.degrees(np.hypot(*tilt))
         said += "; attitude is not logged" if size is None else f"; leans by {size:.1f} deg in hover"
+        said += f", as in wind {speed}" if (speed := wind_words(trim)) else ""
     return said
+
+
+def seconded(cause: Cause, said: Sequence[Said]) -> Cause:
+    """A cause with how many of the registered sources of diagnosis say the same.
+
+    Parameters
+    ----------
+    cause : Cause
+        The most probable.
+    said : sequence of Said
+
+    Notes
+    -----
+    They count as no further evidence: they look at the same records, and what stands in them is already weighed.
+    """
+    ran = [one for one in said if not one.note or one.flags]
+    if not ran:
+        return cause
+    if cause.rotor is None:
+        quiet = sum(not one.flags for one in ran)
+        return cause._replace(evidence=f"{cause.evidence}; {quiet} of {len(ran)} registered sources flag nobody")
+    same = sum(any(rotor == cause.rotor for rotor, *_ in one.flags) for one in ran)
+    return cause._replace(evidence=f"{cause.evidence}; {same} of {len(ran)} registered sources flag it too")
 
 
 def own_words(log: Log) -> tuple[str, ...]:
@@ -96,7 +147,7 @@ def own_words(log: Log) -> tuple[str, ...]:
     return tuple(said[:10])
 
 
-def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> str:
+def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None, trim: Trim | None = None) -> str:
     """The diagnosis in a sentence.
 
     Parameters
@@ -106,6 +157,8 @@ def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> 
         By probability.
     evidence : Evidence or None
         Of hover.
+    trim : Trim or None
+        The trim that it is of.
     """
     first = causes[0]
     how = f"({likely(first.probability)}, {percent(first.probability)})"
@@ -121,26 +174,26 @@ def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> 
             if first.onset is None
             else f"{first.cause} since {when(log, first.onset)}"
         )
-        return f"{word} {how}{_rest(log, causes, None)}"
+        return f"{word} {how}{_rest(log, causes, None, None)}"
     may = "" if first.probability >= 0.75 else " may have"
-    lost = "lost thrust" if first.loss is None else f"lost about {first.loss:.0%}"
+    lost = "lost thrust" if first.loss is None else f"lost about {100.0 * first.loss:.0f} % of its thrust"
     since = f"from {when(log, first.onset)}" if first.onset is not None else "from the beginning of the log"
-    return f"{rotor_words(log, first.rotor)}{may} {lost} {since} {how}{_rest(log, causes, evidence)}"
+    return f"{rotor_words(log, first.rotor)}{may} {lost} {since} {how}{_rest(log, causes, evidence, trim)}"
 
 
-def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None) -> str:
+def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None, trim: Trim | None) -> str:
     """What else would explain a part of it, and what cannot be excluded."""
     said = ""
-    if evidence is not None and causes[0].onset is None:
+    if evidence is not None and "in hover" in causes[0].evidence:
         for name in ("wind", "centre of mass shifted"):
             share = evidence.explained.get(name, 0.0)
             if share >= 0.1:
-                word = "wind" if name == "wind" else "a shifted centre of mass"
-                said += f"; {word} would explain {share:.0%} of it"
+                word = f"wind {wind_words(trim)}".strip() if name == "wind" else "a shifted centre of mass"
+                said += f"; {word} would explain {100.0 * share:.0f} % of it"
     doubts = [one for one in causes[1:] if one.probability >= 0.05][:2]
     for one in doubts:
         name = rotor_words(log, one.rotor) if one.rotor is not None else one.cause
-        name = "a sound vehicle" if name == "healthy" else name
+        name = NAMED.get(name, name)
         said += f"; {name} cannot be excluded ({percent(one.probability)})"
     return said
 

@@ -133,7 +133,10 @@ class LogDiagnosis:
         lines += table_lines(table, "><<", indent=2, rule=True, most=terminal_width())
         for title, items in (
             ("its own messages", self.own),
-            ("registered sources of diagnosis", tuple(_said(one, self.log) for one in self.detectors)),
+            (
+                "registered sources of diagnosis (of the same records, so they do not count again)",
+                tuple(_said(one, self.log, self.probable) for one in self.detectors),
+            ),
              ("cannot tell", self.limits), ("read", self._read()),
         ):  # fmt: skip
             if items:
@@ -146,10 +149,19 @@ class LogDiagnosis:
         return (*self.log.remarks, *lost)
 
 
-def _said(one: Said, log: Log) -> str:
-    """What a source says, in a line."""
-    flags = ", ".join(f"rotor {rotor} from {when(log, time)}" for rotor, time, _ in one.flags) or "nobody"
-    return f"{one.detector}: {one.note}" if one.note and not one.flags else f"{one.detector} flags {flags}"
+def _said(one: Said, log: Log, first: Cause) -> str:
+    """What a source says, in a line, and whether the verdict says the same."""
+    if one.note and not one.flags:
+        return f"{one.detector}: {one.note}"
+    if not one.flags:
+        return f"{one.detector} flags nobody" + ("" if first.rotor is None else ", other than the verdict")
+    flags = []
+    for rotor, time, loss in one.flags:
+        since = first.onset if rotor == first.rotor else None
+        late = f", {time - since:.2f} s after the onset" if since is not None and time >= since else ""
+        flags.append(f"rotor {rotor} from {when(log, time)}{late}, and believes that {100.0 * loss:.0f} % is lost")
+    same = any(rotor == first.rotor for rotor, *_ in one.flags)
+    return f"{one.detector} flags " + "; ".join(flags) + ("" if same else "; the verdict does not")
 
 
 def _named(cause: Cause) -> str:

@@ -35,7 +35,7 @@ from rotorfault.results.flown import configuration_of, true_vehicle_file
 MOST = 6  # flights on a page: as many as have colours that colour-blind readers tell apart
 ROOM = 5_500_000  # characters of data: the page stays below 8 MB with its program
 DENSE = 0.1  # s around events in which no record is left out
-LONGEST = 200  # characters of a name that are shown
+LONGEST, LONGEST_LINE = 200, 1000  # characters that are shown of a name, and of a line of a summary
 
 
 class Shown(NamedTuple):
@@ -90,6 +90,7 @@ def page(flights: Sequence[Shown]) -> str:
         records=[_provenance(flight) for flight in flights],
         spins=any(flight["spins"] for flight in payload["flights"]),
         rotors=any(flight["vehicle"] is not None for flight in payload["flights"]),
+        logged=all("logged" in flight.data.attrs for flight in flights),
         thinned=_thinned(payload),
         data=script_data(payload),
         css=Markup((folder / "bundle" / "flight.css").read_text(encoding="utf-8")),
@@ -240,7 +241,7 @@ def _provenance(flight: Shown) -> dict[str, Any]:
             ("parts", ", ".join(f"{_short(part['slot'])} {_short(part['kind'])}" for part in parts)),
             ("flown with", ", ".join(f"{_short(name)} {_short(value)}" for name, value in versions.items())),
         ],
-        "rows": [(_short(label), _short(text)) for label, text in flight.rows],
+        "rows": [(_short(label), _short(text, LONGEST_LINE)) for label, text in flight.rows],
         "command": one_line(f"rotorfault fly --repeat {argument(flight.source)}") if flight.source else "",
     }
 
