@@ -147,3 +147,15 @@ def test_a_loss_after_which_yaw_cannot_be_held_is_laid_to_its_rotor() -> None:
     assert found.probable.probability > 0.95
     assert found.probable.onset == pytest.approx(10.0, abs=0.1)
     assert found.probable.loss == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_log_is_not_compared_with_itself(tmp_path: Path) -> None:
+    paths = [write_csv(flown(seed=k, seconds=12.0, imbalance=UNEVEN), tmp_path / f"{k}.csv") for k in range(3)]
+    weak = write_csv(flown(seed=9, seconds=12.0, imbalance=UNEVEN, rotor=3, loss=0.3, onset=-1.0), tmp_path / "w.csv")
+    found = rf.diagnose(weak, baseline=[*paths, weak])
+    assert isinstance(found, LogDiagnosis)
+    assert found.rotor == 4
+    assert any("compared with the others" in limit for limit in found.limits)
+    alone = rf.diagnose(weak, baseline=weak)
+    assert isinstance(alone, LogDiagnosis)
+    assert any("itself the baseline" in limit for limit in alone.limits)

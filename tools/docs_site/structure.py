@@ -15,6 +15,7 @@ CHILDREN: dict[str, list[str]] = {
         "own-vehicle-and-controller",
         "tutorials/own-parts",
         "tutorials/survival-map",
+        "tutorials/own-log",
         "tutorials/*",
         "notebooks/first-flight",
         "notebooks/detection-delay",

@@ -134,7 +134,31 @@ def diagnosed(path: Path, baseline: Baseline | None, vehicle: str | Path | None 
         If it cannot be read, or the baseline is of another vehicle.
     """
     log = read_log(path)
-    return diagnosis_of(log, baseline_for(log, baseline), vehicle)
+    others = without(path, baseline_for(log, baseline))
+    found = diagnosis_of(log, others, vehicle)
+    if baseline is not None and others is not baseline:
+        said = "is itself in the baseline and is compared with the others there"
+        said = said if others is not None else "is itself the baseline, and nothing else is in it: give other flights"
+        found.limits = (*found.limits, f"the log {said}")
+    return found
+
+
+def without(path: Path, baseline: Baseline | None) -> Baseline | None:
+    """A baseline without a log that is to be compared with it; None where nothing is left.
+
+    Parameters
+    ----------
+    path : Path
+        Of the log.
+    baseline : Baseline or None
+    """
+    if baseline is None:
+        return None
+    digest = digest_of(path / "flight.nc" if path.is_dir() else path)
+    kept = tuple(one for one in baseline.flights if one.sha256 != digest)
+    if len(kept) == len(baseline.flights):
+        return baseline
+    return baseline._replace(flights=kept) if kept else None
 
 
 def baseline_for(log: Log, baseline: Baseline | None) -> Baseline | None:

@@ -19,6 +19,7 @@ from rotorfault.logs.dynamics import Response, residual_of
 from rotorfault.logs.log import Layout, Log
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
 from rotorfault.logs.trim import Trim
+from rotorfault.logs.vibration import Shaking, shaking_of
 from rotorfault.maths.arrays import Array
 
 FORMAT = "rotorfault baseline 1"
@@ -35,6 +36,7 @@ class Flown(NamedTuple):
     trim: Trim | None
     response: Response | None
     parameters: Mapping[str, float]
+    shaking: Shaking | None = None
 
 
 class Baseline(NamedTuple):
@@ -119,7 +121,8 @@ def learned(logs: Sequence[Log], digests: Sequence[str]) -> Baseline:
             longest = max(spans, key=lambda span: span[1] - span[0])
             residual = residual_of(log, longest[0] + 1.5, longest[1], mean)
             response = None if residual is None else residual.response
-        flights.append(Flown(log.source, digest, log.kind, trim, response, log.parameters))
+        shaking, _ = shaking_of(log, spans)
+        flights.append(Flown(log.source, digest, log.kind, trim, response, log.parameters, shaking))
     if layout is None or not any(one.trim or one.response for one in flights):
         raise InputError("no log of the baseline flies; give logs of healthy flights, best with some hover")
     return Baseline(layout, tuple(flights))
@@ -181,6 +184,7 @@ def write_baseline(baseline: Baseline, path: Path, extra: Mapping[str, Any] | No
                 "kind": one.kind,
                 "trim": None if one.trim is None else _plain(one.trim._asdict()),
                 "response": None if one.response is None else _plain(one.response._asdict()),
+                "shaking": None if one.shaking is None else _plain(one.shaking._asdict()),
                 "parameters": _plain(dict(one.parameters)),
             }
             for one in baseline.flights
@@ -273,4 +277,7 @@ def _flown(tables: Mapping[str, Any], count: int) -> Flown:
             bool(response["lag_known"]), float(response["hover"]),
         ),
         {str(k): float(v) for k, v in tables["parameters"].items() if v is not None},
+        None if (shaking := tables.get("shaking")) is None else Shaking(
+            str(shaking["of"]), numbers(shaking["size"], (count,)), int(shaking["blocks"])
+        ),
     )  # fmt: skip

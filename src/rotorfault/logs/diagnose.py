@@ -19,10 +19,18 @@ from rotorfault.logs.dynamics import Residual, Response, block_length, residual_
 from rotorfault.logs.log import Log, Note, when
 from rotorfault.logs.scan import FIRST, Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
-from rotorfault.logs.sentences import own_words, seconded, sudden_evidence, trim_evidence, verdict_of
+from rotorfault.logs.sentences import (
+    own_words,
+    seconded,
+    shaking_words,
+    sudden_evidence,
+    trim_evidence,
+    verdict_of,
+)
 from rotorfault.logs.steady import Steady, steady_of
 from rotorfault.logs.trim import PRIOR
 from rotorfault.logs.verdict import Cause, LogDiagnosis
+from rotorfault.logs.vibration import shaking_of
 
 # How often a flight that is looked at has a rotor that suddenly loses thrust, and a lasting push that begins in it.
 # Of what is met at all, half is taken to begin in flight, since nothing is known of it.
@@ -83,8 +91,14 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
         said = said_by_all(log, (span[0] + TAKE_OFF, span[1]), before, vehicle)
         causes = (seconded(causes[0], said), *causes[1:])
     verdict = verdict_of(log, causes, evidence, None if steady is None else steady.trim)
+    shaking, why = shaking_of(log, spans)
+    limits += [why] if why else []
+    shakes = [] if shaking is None else shaking_words(log, shaking, baseline)
+    verdict += f"; {shakes[0]}" if shakes and causes[0].cause == "healthy" and "times as much" in shakes[0] else ""
     scans = tuple(one.scan for one in sudden)
-    return LogDiagnosis(log, causes, verdict, tuple(limits), scans, evidence, own_words(log), tuple(said))
+    return LogDiagnosis(
+        log, causes, verdict, tuple(limits), scans, evidence, own_words(log), tuple(said), tuple(shakes)
+    )  # fmt: skip
 
 
 def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known: Response | None) -> list[Sudden]:

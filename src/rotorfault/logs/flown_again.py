@@ -11,7 +11,7 @@ import numpy as np
 from rotorfault.base.csv_text import write_columns
 from rotorfault.base.errors import InputError
 from rotorfault.flight.flight import Flight
-from rotorfault.logs.api import baseline_for, baseline_of
+from rotorfault.logs.api import baseline_for, baseline_of, without
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log
@@ -65,7 +65,7 @@ def like(path: str | Path, folder: Path, settings: Mapping[str, Any], baseline: 
     spans = flight_spans(log)
     if not spans:
         raise InputError(f"{log.source}: motors never carry the vehicle: there is no flight in it")
-    found = diagnosis_of(log, baseline_for(log, baseline_of(baseline)))
+    found = diagnosis_of(log, without(Path(path), baseline_for(log, baseline_of(baseline))))
     name = settings.get("vehicle", USUAL.get(log.kind, "x500"))
     vehicle = load_vehicle(name) if isinstance(name, (str, Path)) else None
     if vehicle is None:

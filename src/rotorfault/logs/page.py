@@ -90,6 +90,7 @@ def shown(found: LogDiagnosis, label: str = "", file: VehicleFile | None = None,
         if one.probability >= 0.005
     ]
     rows += [("its own message", said) for said in found.own]
+    rows += [("vibration", said) for said in found.vibration]
     rows += [("cannot tell", said) for said in found.limits]
     rows += [("read", said) for said in found.log.remarks]
     if found.log.damage.reason:

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rotorfault.logs.baseline import Baseline
 from rotorfault.logs.detectors import Said
 from rotorfault.logs.dynamics import G
 from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence, Trim
 from rotorfault.logs.verdict import Cause, likely
+from rotorfault.logs.vibration import Shaking, more_than
 
 # 1/s, drag over mass: mean of its logarithm and standard deviation, of the built-in vehicles (0.12 to 0.45).
 DRAG = (math.log(0.23), 0.45)
@@ -134,6 +136,28 @@ def seconded(cause: Cause, said: Sequence[Said]) -> Cause:
         return cause._replace(evidence=f"{cause.evidence}; {quiet} of {len(ran)} registered sources flag nobody")
     same = sum(any(rotor == cause.rotor for rotor, *_ in one.flags) for one in ran)
     return cause._replace(evidence=f"{cause.evidence}; {same} of {len(ran)} registered sources flag it too")
+
+
+def shaking_words(log: Log, now: Shaking, baseline: Baseline | None) -> list[str]:
+    """How much each rotor shakes the body: those that do so more than in healthy flights, else the sizes alone.
+
+    Parameters
+    ----------
+    log : Log
+    now : Shaking
+    baseline : Baseline or None
+    """
+    before = [] if baseline is None else [one.shaking for one in baseline.flights if one.shaking is not None]
+    more = more_than(now, before)
+    unit = "m/s^2" if now.of == "specific force" else "rad/s"
+    sizes = ", ".join(f"{k + 1}: {size:.2g}" for k, size in enumerate(now.size))
+    all_of = f"{now.of} once per turn, in {unit}, of motor {sizes} ({now.blocks} blocks of 2 s)"
+    if more:
+        said = [f"{rotor_words(log, k + 1)} shakes {times:.1f} times as much as in healthy flights: look at its "
+                "propeller" for k, times in sorted(more, key=lambda one: -one[1])]  # fmt: skip
+        return [*said, all_of]
+    same = [one for one in before if one.of == now.of]
+    return [all_of, "as in healthy flights" if same else "no healthy flight to compare it with: give --baseline"]
 
 
 def own_words(log: Log) -> tuple[str, ...]:

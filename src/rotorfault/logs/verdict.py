@@ -47,9 +47,11 @@ class LogDiagnosis:
         What the flight software itself said of motors.
     detectors : tuple of Said
         What the registered sources of diagnosis say, where the vehicle is known.
+    vibration : tuple of str
+        How much each rotor shakes the body, where the log can tell.
     """
 
-    __slots__ = ("causes", "detectors", "limits", "log", "own", "scans", "trim", "verdict")
+    __slots__ = ("causes", "detectors", "limits", "log", "own", "scans", "trim", "verdict", "vibration")
 
     def __init__(
         self,
@@ -61,9 +63,11 @@ class LogDiagnosis:
         trim: Evidence | None = None,
         own: tuple[str, ...] = (),
         detectors: tuple[Said, ...] = (),
+        vibration: tuple[str, ...] = (),
     ) -> None:
         self.log, self.causes, self.verdict, self.limits = log, causes, verdict, limits
         self.scans, self.trim, self.own, self.detectors = scans, trim, own, detectors
+        self.vibration = vibration
 
     @property
     def probable(self) -> Cause:
@@ -109,6 +113,7 @@ class LogDiagnosis:
             "start": _rounded(self.log.start, 4),
             "duration": _rounded(self.log.duration, 4),
             "own_messages": list(self.own),
+            "vibration": list(self.vibration),
             "detectors": [
                 {
                     "detector": one.detector,
@@ -133,6 +138,7 @@ class LogDiagnosis:
         lines += table_lines(table, "><<", indent=2, rule=True, most=terminal_width())
         for title, items in (
             ("its own messages", self.own),
+            ("vibration", self.vibration),
             (
                 "registered sources of diagnosis (of the same records, so they do not count again)",
                 tuple(_said(one, self.log, self.probable) for one in self.detectors),
