@@ -214,6 +214,7 @@ def main() -> int:
     """Print all of it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flightdx", metavar="PYTHON", help="a Python that has flightdx")
+    parser.add_argument("--peers", action="store_true", help="only what other programs say of the same files")
     parser.add_argument("--simulated", type=int, default=60, help="healthy flights of two minutes that are flown")
     chosen = parser.parse_args()
     folder = os.environ.get("ROTORFAULT_DATA", "")
@@ -224,6 +225,9 @@ def main() -> int:
     data = Path(folder)
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
+        if chosen.peers:
+            peers(data, scratch, chosen.flightdx)
+            return 0
         normal = crazyflie(data)
         failures(data, scratch)
         print("\nFalse alarms")

@@ -15,6 +15,8 @@ from rotorfault.logs.baseline import learned, read_baseline, write_baseline
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log
 from rotorfault.logs.recorded import log_of as recorded
+from rotorfault.logs.sentences import wind_words
+from rotorfault.logs.trim import Trim
 from rotorfault.logs.verdict import LogDiagnosis
 
 UNEVEN = (0.12, -0.1, 0.03, -0.05)
@@ -147,6 +149,16 @@ def test_a_loss_after_which_yaw_cannot_be_held_is_laid_to_its_rotor() -> None:
     assert found.probable.probability > 0.95
     assert found.probable.onset == pytest.approx(10.0, abs=0.1)
     assert found.probable.loss == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_wind_that_a_vehicle_leans_against_has_a_speed_and_a_side() -> None:
+    lean = np.radians(8.0)
+    trim = Trim(np.zeros(4), np.zeros(4), 10, 15.0, np.array([0.0, np.sin(lean)]))
+    assert wind_words(trim) == " of 6 m/s (3 to 13) from the left"
+    assert wind_words(trim._replace(tilt=-trim.tilt)).endswith("from the right")
+    assert wind_words(trim._replace(tilt=trim.tilt[::-1])).endswith("from the front")
+    assert "0.5 deg only" in wind_words(trim._replace(tilt=np.array([np.radians(0.5), 0.0])))
+    assert wind_words(trim._replace(tilt=np.full(2, np.nan))) == ""
 
 
 def test_a_log_is_not_compared_with_itself(tmp_path: Path) -> None:

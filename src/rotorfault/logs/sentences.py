@@ -18,13 +18,13 @@ from rotorfault.logs.vibration import Shaking, more_than
 
 # 1/s, drag over mass: mean of its logarithm and standard deviation, of the built-in vehicles (0.12 to 0.45).
 DRAG = (math.log(0.23), 0.45)
-LEANS = math.radians(0.5)  # below which a lean is that of an estimate
+LEANS = math.radians(1.0)  # below which a lean may be an error of the attitude
 NAMED = {"healthy": "a sound vehicle", "centre of mass shifted": "a shifted centre of mass"}
 SIDES = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
 
 
 def wind_words(trim: Trim | None) -> str:
-    """The wind that a vehicle leans against in hover, by what vehicles have of drag; empty where it does not lean.
+    """The wind that a vehicle leans against in hover, by what vehicles have of drag; empty where nobody knows.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def wind_words(trim: Trim | None) -> str:
     forward, left = trim.tilt
     lean = math.asin(min(math.hypot(forward, left), 1.0))
     if lean < LEANS:
-        return ""
+        return f", though it leans by {math.degrees(lean):.1f} deg only,"
     side = SIDES[round(math.atan2(left, forward) / (math.pi / 4.0)) % 8]
     speeds = [G * math.tan(lean) / math.exp(DRAG[0] + k * 1.645 * DRAG[1]) for k in (1.0, 0.0, -1.0)]
-    return f"of {speeds[1]:.0f} m/s ({speeds[0]:.0f} to {speeds[2]:.0f}) from the {side}"
+    return f" of {speeds[1]:.0f} m/s ({speeds[0]:.0f} to {speeds[2]:.0f}) from the {side}"
 
 
 def rotor_words(log: Log, rotor: int) -> str:
@@ -111,7 +111,7 @@ def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim |
         tilt = None if trim is None or not np.isfinite(trim.tilt).all() else trim.tilt
         size = None if tilt is None else np.degrees(np.hypot(*tilt))
         said += "; attitude is not logged" if size is None else f"; leans by {size:.1f} deg in hover"
-        said += f", as in wind {speed}" if (speed := wind_words(trim)) else ""
+        said += f", as in wind{speed}" if (speed := wind_words(trim)).startswith(" of") else ""
     return said
 
 
@@ -212,7 +212,7 @@ def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None, trim: Tr
         for name in ("wind", "centre of mass shifted"):
             share = evidence.explained.get(name, 0.0)
             if share >= 0.1:
-                word = f"wind {wind_words(trim)}".strip() if name == "wind" else "a shifted centre of mass"
+                word = f"wind{wind_words(trim)}" if name == "wind" else "a shifted centre of mass"
                 said += f"; {word} would explain {100.0 * share:.0f} % of it"
     doubts = [one for one in causes[1:] if one.probability >= 0.05][:2]
     for one in doubts:
