@@ -193,7 +193,10 @@ def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> flo
     if calm.sum() < SETTLED / residual.block or calm.mean() < 0.8:
         return None
     shape = axes[:, rotor]
-    mean = np.nanmedian(rho[after][calm][:, :3], axis=0)
+    known = rho[after][calm][:, :3]
+    if not np.isfinite(known).any(axis=0).all():
+        return None
+    mean = np.nanmedian(known, axis=0)
     loss = -float(mean @ shape) / float(shape @ shape) / float(np.median(command[calm, rotor]))
     return min(max(loss, 0.01), 1.0)
 
