@@ -56,7 +56,7 @@ from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, clip, exp, less, select
+from rotorfault.maths.scalar import Scalar, absolute, clip, exp, less, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
@@ -103,6 +103,7 @@ class ModelParameters(NamedTuple):
     walk: tuple[Scalar, ...]  # variances by which they grow per second
     gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
     drag: Scalar  # 1/s: drag over airspeed and mass
+    at_rotors: Scalar  # share of it that acts at the rotors
     inertia: Scalar  # share
     lag: Scalar  # s: of the rotors
     gyroscope: Scalar  # rad^2/s^2: least variance
@@ -165,6 +166,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG),
         gradient=Vec3(*(_gradient(s, drag, arms) / (j * j) for j in J)),
         drag=over,
+        at_rotors=1.0 - float(vehicle.linear_drag) / drag if drag > 0.0 else 0.0,
         inertia=s.inertia,
         lag=1.0 / w,
         gyroscope=sensed.variance(context, "rates", s.gyroscope),
@@ -263,7 +265,8 @@ def advance(
     level_W = inputs.estimate.q_WB.matrix().T.rows
     # Force of the air over mass: drag of the own way, and what the wind adds.
     air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
-    lever = _lever_rows(vehicle, air_W.dot(level_W[0]), air_W.dot(level_W[1]))
+    forward, left_B = air_W.dot(level_W[0]), air_W.dot(level_W[1])
+    lever = _lever_rows(vehicle, forward, left_B)
     weigh = (wrench.thrust - less_thrust) / weight
 
     beyond: Scalar = 0.0
@@ -275,12 +278,17 @@ def advance(
     noise: dict[int, Scalar] = {}
     wrong = _second_order(vehicle, omega_B, lagging, belief, p)
     change = turn * dt + reaction(e, vehicle, stuck)
+    yawed: dict[int, Scalar] = {}
+    if vehicle.air != ():
+        blown, shift_rows = _drag_about_yaw(vehicle, e.speed, forward, left_B, p.at_rotors)
+        change = change + Vec3(0.0, 0.0, blown * dt)
+        yawed = {OFFSETS + k: factor * dt for k, factor in enumerate(shift_rows)}
     known: dict[int, Scalar] = {}
     for axis, name in enumerate("xyz"):
         row = {
             OFFSETS + axis: weigh * dt,
             BANDWIDTH: getattr(lagging, name) * dt + getattr(reacted, name),
-            **({LEVERS + axis: lever[axis] * dt} if axis < 2 else {}),
+            **({LEVERS + axis: lever[axis] * dt} if axis < 2 else yawed),
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
         # Of what turns the body in all, a wrong inertia is wrong by a share; the learned lag is in the model already.
@@ -354,6 +362,22 @@ def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar
     """Angular accelerations in rad/s^2 about roll and pitch by the air's lateral force, at a lever of 1 m."""
     m, J = vehicle.mass, vehicle.inertia
     return -left * (m / J.x), forward * (m / J.y)
+
+
+def _drag_about_yaw(
+    vehicle: Vehicle, speeds: PerRotor, forward: Scalar, left: Scalar, share: Scalar
+) -> tuple[Scalar, tuple[Scalar, Scalar]]:
+    """Angular acceleration in rad/s^2 about yaw by the rotors' drag, and of it per offset about roll and pitch.
+
+    A rotor that turns faster has more drag, so the force attacks where the speeds have their mean; a centre of mass
+    that is shifted by (s_x, s_y) = g^-1 (J_y d_y, -J_x d_x)/m lies beside that.
+    """
+    J, size = vehicle.inertia, speeds.map(absolute)
+    over = share * vehicle.mass / J.z
+    x, y = (place.dot(size) for place in (vehicle.rotor_x, vehicle.rotor_y))
+    turned = (x * left - y * forward) * (over / size.sum())
+    beside = share / (vehicle.gravity * J.z)
+    return turned, (-forward * (J.x * beside), -left * (J.y * beside))
 
 
 def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, belief: Belief, p: ModelParameters) -> Vec3:
