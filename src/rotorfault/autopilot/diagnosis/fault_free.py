@@ -17,8 +17,15 @@ with :math:`\alpha` and T of the believed model with sound rotors, and
   flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the air's specific force f. So what grows with
   airspeed belongs to the air;
 - a, force of the wind over mass in world axes, a random walk, which the accelerometer measures on all axes, with the
-  drag of the own way, :math:`f = R^T(a - \tfrac{k_d}mv)`; :math:`e_m`, the share of mass and battery;
+  drag of the own way, :math:`f = R^T(a - \tfrac{k_d}mv)`, less along body z, where rotors have no drag;
+  :math:`e_m`, the share of mass and battery;
 - :math:`\lambda_i`, the losses, each taken to last. They are 0, with no variance, where no fault is believed.
+
+Drag of the rotors, the share :math:`\beta` of all, turns the body about yaw. It attacks at their mean place by speed,
+beside which the centre of mass lies by the shift that d tells:
+
+.. math:: \dot\omega_z \mathrel{+}= \tfrac{\beta m}{J_z}(\bar xf_y - \bar yf_x)
+                                    - \tfrac{\beta}{gJ_z}(J_xf_xd_x + J_yf_yd_y)
 
 The wind's force walks with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of
 standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle
@@ -41,6 +48,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from rotorfault.autopilot.diagnosis import learned_lag, sensed
+from rotorfault.autopilot.diagnosis.air_of_model import ALTITUDE, air_drag, drag_about_yaw, gust_gradient, lever_rows
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -56,10 +64,9 @@ from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, absolute, clip, exp, less, select
+from rotorfault.maths.scalar import Scalar, clip, exp, less, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
-from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
 from rotorfault.model.turbulence import turbulence
 from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
@@ -67,13 +74,11 @@ from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
 
-ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
 LEAST_INERTIA = 0.5  # share by which an inertia may seem to be wrong: more is no wrong model
 TINY = 1e-12  # variance of a loss below which it is known
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
 SLOW = 3600.0  # s: in which what is built changes by as much as it is uncertain: some flights
-STILL = 1.0  # m/s: least wind that carries gusts past
 
 
 class ModelSettings(Strict):
@@ -104,6 +109,7 @@ class ModelParameters(NamedTuple):
     gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
     drag: Scalar  # 1/s: drag over airspeed and mass
     at_rotors: Scalar  # share of it that acts at the rotors
+    along: Scalar  # drag along body z over that across it
     inertia: Scalar  # share
     lag: Scalar  # s: of the rotors
     gyroscope: Scalar  # rad^2/s^2: least variance
@@ -144,7 +150,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     vehicle, s = context.vehicle, settings
     weight = vehicle.mass * vehicle.gravity
     J = vehicle.inertia
-    drag = air_drag(vehicle)
+    drag, along = air_drag(vehicle)
     arms = math.sqrt(
         sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors
     )
@@ -156,40 +162,26 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     tilt = s.centre_of_mass * weight
     offsets = ((tilt / J.x) ** 2, (tilt / J.y) ** 2, (yaw / J.z) ** 2)
     over = drag / vehicle.mass
-    along = (over * s.wind) ** 2 + (over * gusts.sigma_level) ** 2
-    blows = (along, along, (over * gusts.sigma_up) ** 2)
+    level_force = (over * s.wind) ** 2 + (over * gusts.sigma_level) ** 2
+    blows = (level_force, level_force, (over * gusts.sigma_up) ** 2)
     mass, inertia, bandwidth = s.mass**2, s.inertia**2, s.bandwidth**2
     constants = (*offsets, inertia, inertia, inertia, bandwidth, lever**2, lever**2)
     w = mean_bandwidth(vehicle)
+    # What gusts may do to thrust besides, by its inflow, is as large as an even drag would have it.
+    inflow = (over * (1.0 - along) / vehicle.gravity) ** 2 * up
     return ModelParameters(
         start=(*constants, *blows, mass),
-        walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG),
-        gradient=Vec3(*(_gradient(s, drag, arms) / (j * j) for j in J)),
+        walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG + inflow),
+        gradient=Vec3(*(gust_gradient(s.wind, drag, arms) / (j * j) for j in J)),
         drag=over,
         at_rotors=1.0 - float(vehicle.linear_drag) / drag if drag > 0.0 else 0.0,
+        along=along,
         inertia=s.inertia,
         lag=1.0 / w,
         gyroscope=sensed.variance(context, "rates", s.gyroscope),
         accelerometer=sensed.variance(context, "specific_force", s.accelerometer),
         end=sensed.end_of_range(context),
     )
-
-
-def _gradient(settings: ModelSettings, drag: float, arms: float) -> float:
-    """Density in (N m)^2 s of the torque of gusts that differ from one side of the vehicle to the other."""
-    gusts, across = turbulence(settings.wind, ALTITUDE), 2.0 * arms
-    torque = 0.5 * drag * arms
-    both = (gusts.sigma_up**2 / gusts.length_up, gusts.sigma_level**2 / gusts.length_level)
-    return max(2.0 * across * share for share in both) * torque**2 * 2.0 * across / max(settings.wind, STILL)
-
-
-def air_drag(vehicle: Vehicle) -> float:
-    """Drag over airspeed in N s/m in hover: linear drag, and that of the rotors."""
-    drag = float(vehicle.linear_drag)
-    if vehicle.air != ():
-        speeds = rotor_speeds(vehicle, hover_thrust(vehicle))
-        drag += float(vehicle.air.rotor_drag * speeds.sum())  # type: ignore[union-attr]
-    return drag
 
 
 def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemory:
@@ -237,7 +229,8 @@ def advance(
     pull : scalar, 1/s
         Rate with which losses return to 0 that the motion does not show.
     """
-    p, belief, mean = parameters, memory.belief, memory.belief.mean
+    p, belief = parameters, within_bounds(memory.belief)
+    mean = belief.mean
     vehicle = learned_lag.with_lag(inputs.vehicle, mean[BANDWIDTH])
     e, lagged = learned_lag.held(memory.lagged, memory.speed, inputs.expectation, inputs.command, vehicle, period)
     dt = e.elapsed
@@ -266,7 +259,7 @@ def advance(
     # Force of the air over mass: drag of the own way, and what the wind adds.
     air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
     forward, left_B = air_W.dot(level_W[0]), air_W.dot(level_W[1])
-    lever = _lever_rows(vehicle, forward, left_B)
+    lever = lever_rows(vehicle, forward, left_B)
     weigh = (wrench.thrust - less_thrust) / weight
 
     beyond: Scalar = 0.0
@@ -280,7 +273,7 @@ def advance(
     change = turn * dt + reaction(e, vehicle, stuck)
     yawed: dict[int, Scalar] = {}
     if vehicle.air != ():
-        blown, shift_rows = _drag_about_yaw(vehicle, e.speed, forward, left_B, p.at_rotors)
+        blown, shift_rows = drag_about_yaw(vehicle, e.speed, forward, left_B, p.at_rotors)
         change = change + Vec3(0.0, 0.0, blown * dt)
         yawed = {OFFSETS + k: factor * dt for k, factor in enumerate(shift_rows)}
     known: dict[int, Scalar] = {}
@@ -295,7 +288,7 @@ def advance(
         learned = row[BANDWIDTH] * mean[BANDWIDTH] - less_thrust * getattr(shifted, name)  # the latter stands twice
         moved = getattr(change, name)
         whole = moved + dot(row, mean) - learned
-        share = 1.0 / (1.0 + clip(mean[INERTIA + axis], -LEAST_INERTIA, LEAST_INERTIA))
+        share = 1.0 / (1.0 + mean[INERTIA + axis])
         row[INERTIA + axis] = -whole * share * share
         known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
         rows[RATES + axis] = row
@@ -322,10 +315,11 @@ def advance(
     blind = select(less(0.0, felt_B.dot(felt_B)), 0.0, BLIND)
     variances_of_force: list[Scalar] = []
     for axis, (felt, lift, variance) in enumerate(zip(felt_B, lifts, memory.force_noise, strict=True)):
-        row = {WIND + k: component for k, component in enumerate(level_W[axis])}
+        share = p.along if axis == 2 and vehicle.air != () else 1.0
+        row = {WIND + k: component * share for k, component in enumerate(level_W[axis])}
         if axis == 2:
             row |= {MASS: -lift, **{LOSSES + i: value for i, value in enumerate(force)}}
-        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]), variance + blind)
+        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, variance + blind)
         belief = follow(belief, one)
         seen.append((row, one))
         variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))
@@ -334,6 +328,22 @@ def advance(
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
     after = ModelMemory(belief, lagged, speed, lag, reacting, Vec3.of(variances), Vec3.of(variances_of_force))
     return after, Step(rows, torque, force, tuple(seen))
+
+
+def within_bounds(belief: Belief) -> Belief:
+    """A state whose shares of inertia and bandwidth are what a wrong model can be.
+
+    Beyond these a share would turn a torque round, or have no effect that could bring it back.
+
+    Parameters
+    ----------
+    belief : Belief
+    """
+    mean = list(belief.mean)
+    for k in (INERTIA, INERTIA + 1, INERTIA + 2):
+        mean[k] = clip(mean[k], -LEAST_INERTIA, LEAST_INERTIA)
+    mean[BANDWIDTH] = clip(mean[BANDWIDTH], -learned_lag.MOST, learned_lag.MOST)
+    return belief._replace(mean=tuple(mean))
 
 
 def _lifts(vehicle: Vehicle, thrust: PerRotor) -> Vec3:
@@ -356,28 +366,6 @@ def _loss_torques(
         tuple(-f * (dt * g + d) for g, d in zip(turn, shifted, strict=True))
         for f, turn in zip(thrust, turns, strict=True)
     ]
-
-
-def _lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar, Scalar]:
-    """Angular accelerations in rad/s^2 about roll and pitch by the air's lateral force, at a lever of 1 m."""
-    m, J = vehicle.mass, vehicle.inertia
-    return -left * (m / J.x), forward * (m / J.y)
-
-
-def _drag_about_yaw(
-    vehicle: Vehicle, speeds: PerRotor, forward: Scalar, left: Scalar, share: Scalar
-) -> tuple[Scalar, tuple[Scalar, Scalar]]:
-    """Angular acceleration in rad/s^2 about yaw by the rotors' drag, and of it per offset about roll and pitch.
-
-    A rotor that turns faster has more drag, so the force attacks where the speeds have their mean; a centre of mass
-    that is shifted by (s_x, s_y) = g^-1 (J_y d_y, -J_x d_x)/m lies beside that.
-    """
-    J, size = vehicle.inertia, speeds.map(absolute)
-    over = share * vehicle.mass / J.z
-    x, y = (place.dot(size) for place in (vehicle.rotor_x, vehicle.rotor_y))
-    turned = (x * left - y * forward) * (over / size.sum())
-    beside = share / (vehicle.gravity * J.z)
-    return turned, (-forward * (J.x * beside), -left * (J.y * beside))
 
 
 def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, belief: Belief, p: ModelParameters) -> Vec3:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, clip, exp
+from rotorfault.maths.scalar import Scalar, exp
 from rotorfault.model.motion import lag_bandwidth, lag_held, limited
 from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
 
@@ -27,9 +27,9 @@ def with_lag(vehicle: Vehicle, learned: Scalar) -> Vehicle:
     ----------
     vehicle : Vehicle
     learned : scalar
-        Logarithm of the bandwidth over the believed one.
+        Logarithm of the bandwidth over the believed one, up to `MOST` in size.
     """
-    factor = exp(clip(learned, -MOST, MOST))
+    factor = exp(learned)
     faster = vehicle._replace(rotor_bandwidth=vehicle.rotor_bandwidth * factor)
     if isinstance(vehicle.rotor_bandwidth_down, tuple):
         return faster
