@@ -69,3 +69,18 @@ def test_drag_at_the_rotors_blames_none_in_fast_flight() -> None:
     }  # fmt: skip
     flights = rf.fly_many(rf.load_scenario("hover-fault", settings), {"seed": range(8)}, warn=False)
     assert not flights.table["false_alarms"].any()
+
+
+@pytest.mark.long
+def test_the_ground_is_no_fault_of_a_rotor() -> None:
+    """A vehicle that settles on a ground that it does not know of, its centre of mass off: flags without `touch`."""
+    settings: dict[str, Any] = {
+        "duration": 3.0, "vehicle": "x500", "sensors": "mocap", "estimator": "eskf", "diagnosis": "multiple_model",
+        "controller.preset": "midsize", "ground.height": -0.1, "start.position": [0.0, 0.0, 0.3], "fault": [],
+        "reference": {"kind": "waypoints", "points": [
+            {"time": 0.0, "position": [0.0, 0.0, 0.3]}, {"time": 1.5, "position": [0.0, 0.0, -0.11]},
+        ]},
+        "wind.wind_at_6m": 5.0, "wind.velocity_W": [-3.0, 2.0, 0.0], "mismatch.centre_of_mass": [0.007, -0.007, 0.0],
+    }  # fmt: skip
+    flights = rf.fly_many(rf.load_scenario("hover-fault", settings), {"seed": range(8)}, warn=False)
+    assert not flights.table["false_alarms"].any()

@@ -37,6 +37,8 @@ What that leaves out enters as noise: the square of the lag's share, :math:`P_{w
 the rates, which a wrong inertia turns into torque; each lasts about as long as a rotor's lag, so its variance times
 twice that time is the density.
 
+What pushes the body upwards beside rotors and wind may turn it: `rotorfault.autopilot.diagnosis.touch`.
+
 Noise and range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
 """
 
@@ -45,9 +47,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pydantic import Field
-
-from rotorfault.autopilot.diagnosis import learned_lag, sensed
+from rotorfault.autopilot.diagnosis import learned_lag, sensed, touch
 from rotorfault.autopilot.diagnosis.air_of_model import ALTITUDE, air_drag, drag_about_yaw, gust_gradient, lever_rows
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
@@ -60,9 +60,9 @@ from rotorfault.autopilot.diagnosis.kalman import (
     predict,
 )
 from rotorfault.autopilot.diagnosis.model_error import lag_sensitivity, reaction_sensitivity
+from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
-from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, clip, exp, less, select
 from rotorfault.model.block import Context
@@ -81,32 +81,13 @@ SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass i
 SLOW = 3600.0  # s: in which what is built changes by as much as it is uncertain: some flights
 
 
-class ModelSettings(Strict):
-    """How wrong the believed vehicle may be, and what the air and the sensors do: standard deviations."""
-
-    mass: float = Field(default=0.1, ge=0.0, description="share by which mass or battery may be wrong")
-    inertia: float = Field(default=0.2, ge=0.0, description="share by which moments of inertia may be wrong")
-    bandwidth: float = Field(default=0.3, ge=0.0, description="share by which the rotors' bandwidth may be wrong")
-    centre_of_mass: float = Field(default=0.01, ge=0.0, description="how far the centre of mass may be shifted [m]")
-    torque_ratio: float = Field(default=0.1, ge=0.0, description="share by which drag torques may be wrong")
-    lever: float = Field(
-        default=0.2, ge=0.0, description="lever of the air's lateral force, over the arms of the rotors"
-    )
-    wind: float = Field(default=8.0, ge=0.0, description="mean wind at 6 m whose gusts are expected [m/s]")
-    gyroscope: float = Field(
-        default=0.002, gt=0.0, description="noise of the rates at an instant, if the sensors say less [rad/s]"
-    )
-    accelerometer: float = Field(
-        default=0.5, gt=0.0, description="noise of the specific force at an instant, if the sensors say less [m/s^2]"
-    )
-
-
 class ModelParameters(NamedTuple):
     """Numbers of the model."""
 
     start: tuple[Scalar, ...]  # variances of the states behind the rates
     walk: tuple[Scalar, ...]  # variances by which they grow per second
     gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
+    touch: touch.TouchParameters
     drag: Scalar  # 1/s: drag over airspeed and mass
     at_rotors: Scalar  # share of it that acts at the rotors
     along: Scalar  # drag along body z over that across it
@@ -127,6 +108,7 @@ class ModelMemory(NamedTuple):
     reaction: Scalar  # rad/s: of the yaw rate, by the rotors' reaction
     noise: Vec3  # rad^2/s^2: variance of the measured rates
     force_noise: Vec3  # m^2/s^4: variance of the measured specific force
+    touched: touch.TouchMemory = touch.TouchMemory()
 
 
 class Step(NamedTuple):
@@ -173,6 +155,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         start=(*constants, *blows, mass),
         walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG + inflow),
         gradient=Vec3(*(gust_gradient(s.wind, drag, arms) / (j * j) for j in J)),
+        touch=touch.touch_parameters(context, arms),
         drag=over,
         at_rotors=1.0 - float(vehicle.linear_drag) / drag if drag > 0.0 else 0.0,
         along=along,
@@ -270,6 +253,11 @@ def advance(
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
     wrong = _second_order(vehicle, omega_B, lagging, belief, p)
+    felt_B, own_W = inputs.estimate.specific_force_B, inputs.estimate.v_W * p.drag
+    lifts = _lifts(vehicle, e.thrust)
+    air_z = (Vec3.of(mean[WIND : WIND + 3]) - own_W).dot(level_W[2]) * p.along
+    upwards = felt_B.z - lifts.z * (1.0 - mean[MASS]) - air_z
+    touched, push = touch.pushed(memory.touched, upwards, memory.force_noise.z, p.touch)
     change = turn * dt + reaction(e, vehicle, stuck)
     yawed: dict[int, Scalar] = {}
     if vehicle.air != ():
@@ -292,7 +280,7 @@ def advance(
         row[INERTIA + axis] = -whole * share * share
         known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
         rows[RATES + axis] = row
-        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name)) * dt + unknown
+        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name) + getattr(push, name)) * dt + unknown
     if type(pull) is not float or pull != 0.0:  # a number of a batch, or one that is there
         rows |= {LOSSES + i: {LOSSES + i: -pull * dt} for i in range(vehicle.rotors)}
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
@@ -309,8 +297,6 @@ def advance(
         variances.append(sensed.noise_after(variance, one, p.gyroscope, dt * (1.0 - beyond)))
 
     force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
-    lifts = _lifts(vehicle, e.thrust)
-    felt_B, own_W = inputs.estimate.specific_force_B, inputs.estimate.v_W * p.drag
     # A body that feels nothing at all has no accelerometer.
     blind = select(less(0.0, felt_B.dot(felt_B)), 0.0, BLIND)
     variances_of_force: list[Scalar] = []
@@ -326,7 +312,8 @@ def advance(
 
     lagged = lagged + lag * (belief.mean[BANDWIDTH] - mean[BANDWIDTH])
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
-    after = ModelMemory(belief, lagged, speed, lag, reacting, Vec3.of(variances), Vec3.of(variances_of_force))
+    seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
+    after = ModelMemory(belief, lagged, speed, lag, reacting, *seen_noise, touched)
     return after, Step(rows, torque, force, tuple(seen))
 
 

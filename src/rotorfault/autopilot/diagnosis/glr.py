@@ -19,8 +19,9 @@ from pydantic import Field
 
 from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import windows_threshold
-from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters, ModelSettings
+from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters
 from rotorfault.autopilot.diagnosis.kalman import Belief
+from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
