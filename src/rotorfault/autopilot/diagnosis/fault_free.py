@@ -302,10 +302,12 @@ def advance(
     variances_of_force: list[Scalar] = []
     for axis, (felt, lift, variance) in enumerate(zip(felt_B, lifts, memory.force_noise, strict=True)):
         share = p.along if axis == 2 and vehicle.air != () else 1.0
+        # While something pushes neither mass nor wind is learned from it.
+        doubt = blind + touched.largest * touched.largest if axis == 2 else blind
         row = {WIND + k: component * share for k, component in enumerate(level_W[axis])}
         if axis == 2:
             row |= {MASS: -lift, **{LOSSES + i: value for i, value in enumerate(force)}}
-        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, variance + blind)
+        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, variance + doubt)
         belief = follow(belief, one)
         seen.append((row, one))
         variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))
