@@ -30,6 +30,9 @@ def test_the_fitted_model_turns_the_body_better_than_constant_rates() -> None:
     assert found.predictions > 50
     assert fitted.attitude_ahead < 0.8 * guess.attitude_ahead
     assert len(found.table()) == 3
+    assert "fitted to the first half: predicts" in found.verdict
+    worse = found._replace(errors=(fitted._replace(velocity_ahead=9.0, attitude_ahead=9.0), guess))
+    assert "predicts neither better" in worse.verdict
 
 
 def test_what_predictions_begin_with_is_asked_for() -> None:

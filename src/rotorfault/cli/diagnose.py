@@ -174,5 +174,8 @@ def validate_model(
     file = None if vehicle is None else load_vehicle(vehicle)
     for number, path in enumerate(logs):
         found = validated(read_log(path), file)
-        say(("\n" if number else "") + f"{found.log}: {found.predictions} predictions, root mean square of errors")
-        say("\n".join(table_lines(found.table(), "<>>>>", indent=2, rule=True)))
+        say(
+            ("\n" if number else "")
+            + f"{found.log}: {found.predictions} predictions, root mean square of errors ahead"
+        )
+        say("\n".join([*table_lines(found.table(), "<>>>>", indent=2, rule=True), "", found.verdict]))

@@ -17,6 +17,7 @@ from rotorfault.logs.segments import block_means, flight_spans
 from rotorfault.maths.arrays import Array
 
 SURE = 1.645  # standard deviations: intervals hold the number 9 times of 10
+ENOUGH = 3  # flights that say how much healthy ones differ
 BLOCK = 0.5  # s of a block, over which wind and turning are averaged
 
 
@@ -49,7 +50,7 @@ def _of_hover(baseline: Baseline) -> list[Estimate]:
         return []
     flights = np.array([trim.log_command for trim in trims])
     blocks = sum(trim.blocks for trim in trims)
-    source = f"{blocks} s of hover in {len(trims)} flights"
+    source = f"{blocks} s of hover in {len(trims)} flight{'s' if len(trims) != 1 else ''}"
     means = flights.mean(axis=1)
     found = [_interval("hover command", means, "share", source, math.exp)]
     shares = flights - flights.mean(axis=1, keepdims=True)
@@ -189,7 +190,11 @@ def estimate_lines(baseline: Baseline, estimates: Sequence[Estimate]) -> list[st
     baseline : Baseline
     estimates : sequence of Estimate
     """
-    lines = [f"{len(baseline.flights)} logs, {len(baseline.trims)} with hover", ""]
+    flights, hover = len(baseline.flights), len(baseline.trims)
+    lines = [f"{flights} log{'s' if flights != 1 else ''}, {hover} with hover"]
+    if hover < ENOUGH:
+        lines.append(f"give {ENOUGH} flights or more: {hover or 'none'} shows little of how healthy flights differ")
+    lines.append("")
     lines += [f"  {one.log}: " + ("no hover" if one.trim is None else f"{one.trim.blocks} s of hover")
               for one in baseline.flights]  # fmt: skip
     rows = [["", "value", "90 % interval", "unit", "from"]]

@@ -90,6 +90,25 @@ class Validation(NamedTuple):
             for one in self.errors
         ]  # fmt: skip
 
+    @property
+    def verdict(self) -> str:
+        """Where each model is better than the guess half a second ahead, in a sentence each."""
+        guess = self.errors[-1]
+        lines = []
+        for one in self.errors[:-1]:
+            shares = (
+                ("attitude", one.attitude_ahead / max(guess.attitude_ahead, 1e-12)),
+                ("velocity", one.velocity_ahead / max(guess.velocity_ahead, 1e-12)),
+            )
+            said = " and in ".join(f"{name} by {100.0 * share:.0f} %" for name, share in shares)
+            better = [name for name, share in shares if share < 1.0]
+            what = ("neither", better[0] if better else "", "both")[len(better)]
+            lines.append(
+                f"{one.name}: predicts {what} better than the guess {AHEAD:g} s ahead; it errs in {said} of what the "
+                "guess errs by"
+            )
+        return "\n".join(lines)
+
 
 class _Grid(NamedTuple):
     """The log at even times."""
