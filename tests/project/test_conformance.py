@@ -27,7 +27,7 @@ from rotorfault.plant import GROUND, PLANT
 from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import part_from
 from rotorfault.scenario.scenario import Scenario, scenario_from
-from rotorfault.scenario.sensed import estimator_for
+from rotorfault.scenario.sensed import asked_for
 from rotorfault.scenario.slots import SLOTS
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def covering() -> list[Parts]:
         for k in range(EVERYWHERE)
     ]  # fmt: skip
     for parts in flights:
-        wanted = estimator_for(parts["sensors"])
+        wanted = asked_for(SLOTS["estimator"], parts["sensors"])
         if parts["estimator"] == "direct":  # which cannot do without any reading of ideal sensors
             parts["estimator"] = wanted
     return flights
@@ -127,7 +127,7 @@ def with_part(flown: Scenario, part: Any) -> Scenario:
     """The scenario with a part in its slot; what that needs of others is not asked."""
     parts: dict[str, Any] = {part.slot.name: (part,) if part.slot.many else part}
     if part.slot.name == "sensors":
-        parts["estimator"] = part_from(SLOTS["estimator"], estimator_for(part))
+        parts["estimator"] = part_from(SLOTS["estimator"], asked_for(SLOTS["estimator"], part))
     return flown.model_copy(update=parts)
 
 

@@ -79,11 +79,23 @@ class Instant:
     ----------
     outputs : dict
         Output of each part by slot, as far as the instant has come.
+    read : Readings
+        As the sensors give them.
     """
 
     def __init__(self, readings: Readings, reference: Reference, vehicle: Vehicle, past: Past, dt: Scalar) -> None:
-        self.readings, self.reference, self.vehicle, self.past, self.dt = readings, reference, vehicle, past, dt
+        self.read, self.reference, self.vehicle, self.past, self.dt = readings, reference, vehicle, past, dt
         self.outputs: dict[str, Any] = {}
+
+    @property
+    def readings(self) -> Readings:
+        """The readings, as the filter of the inertial unit leaves them."""
+        return cast("Readings", self.outputs.get("imu_filter", self.read))
+
+    @cached_property
+    def speed(self) -> PerRotor:
+        """Believed speeds of sound rotors now in rad/s, by the commands that were sent."""
+        return rotor_speeds(self.vehicle, expected_thrust(self.past.rotors, self.vehicle))
 
     @property
     def estimate(self) -> Estimate:
@@ -125,7 +137,7 @@ class Instant:
         """The last period as believed with sound rotors."""
         tilted = self.vehicle.tilt != ()
         now, thrust = motion_of(self.estimate, tilted), expected_thrust(self.past.rotors, self.vehicle)
-        speed = rotor_speeds(self.vehicle, thrust)
+        speed = self.speed
         return Expectation(
             now=now,
             previous=now if self.past.previous == () else cast("Motion", self.past.previous),

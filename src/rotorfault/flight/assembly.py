@@ -15,6 +15,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.autopilot import AnyBlock
+from rotorfault.autopilot.estimation.imu_filter import IMU_FILTER, behind
 from rotorfault.base.errors import InputError
 from rotorfault.engine.batch import Batch
 from rotorfault.engine.program import same_code
@@ -269,7 +270,7 @@ class _Assembly:
             period = self.scenario.period
             things = [self.objects("vehicle"), self.objects("mismatch")]
             if not truth:
-                things.append(self.objects(SENSORS.name))
+                things += [self.objects(SENSORS.name), self.objects(IMU_FILTER.name)]
             pairs, inverse = _different(things)
             made = []
             for number, (vehicle, mismatch, *sensors) in enumerate(pairs):
@@ -280,7 +281,8 @@ class _Assembly:
                 believed = Context(vehicle.vehicle, period)
                 part: Any = self.own[SENSORS] if SENSORS in self.own else sensors[0].make()
                 model = part.model(believed).scaled(1.0 / mismatch.sensor_noise)
-                made.append(believed._replace(sensors=model))
+                between: Any = self.own[IMU_FILTER] if IMU_FILTER in self.own else sensors[1].make()
+                made.append(believed._replace(sensors=behind(between, model, believed)))
             vehicles_ = alike([one.vehicle for one in made])  # one loop for all
             made = [one._replace(vehicle=vehicle) for one, vehicle in zip(made, vehicles_, strict=True)]
             self._told[truth] = made, inverse

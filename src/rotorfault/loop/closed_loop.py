@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar, cast, final
 
 from rotorfault.autopilot.autopilot import AnyBlock, Autopilot, AutopilotMemory
+from rotorfault.autopilot.estimation.imu_filter import IMU_FILTER, behind
 from rotorfault.autopilot.response.protocol import ON_FAULT
 from rotorfault.base.one_line import LONGEST, cut
 from rotorfault.loop.fault_line import FaultLine
@@ -188,7 +189,9 @@ class ClosedLoop:
         believed = Context(belief, period)
         contexts = {
             "truth": Context(vehicle, period),
-            "belief": believed._replace(sensors=self.sensors.model(believed)),
+            "belief": believed._replace(
+                sensors=behind(self.maybe(IMU_FILTER), self.sensors.model(believed), believed)
+            ),
         }
         return self.record(
             *(

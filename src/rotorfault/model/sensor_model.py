@@ -58,6 +58,7 @@ class SensorNoise(NamedTuple):
     wander: Scalar | tuple[()] = ()  # standard deviation of a slow error (Gauss-Markov); empty where there is none
     wander_time: Scalar | tuple[()] = ()  # s, its correlation time
     vibration: Scalar = 0.0  # amplitude at the rotors' frequency, at hover
+    filtered: Scalar = 0.0  # amplitude that a filter takes out besides, as `Reading.shaken` says for each instant
     limit: Scalar = math.inf  # end of the range; a reading beyond it is cut to it
 
     def __repr__(self) -> str:
@@ -72,6 +73,7 @@ class SensorNoise(NamedTuple):
             bias_walk=self.bias_walk * factor,
             wander=wander,
             vibration=self.vibration * factor,
+            filtered=self.filtered * factor,
         )
 
 

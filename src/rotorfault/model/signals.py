@@ -47,6 +47,7 @@ class Reading(NamedTuple, Generic[T]):
     value: T
     valid: Scalar = 1.0  # 1 where there is a value, else 0
     age: Scalar = 0.0  # s since it was measured
+    shaken: Scalar = 0.0  # unit^2: variance by vibration that a filter expects to be left at this instant
 
     def __repr__(self) -> str:
         return record_line(self)

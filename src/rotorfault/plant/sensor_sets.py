@@ -212,6 +212,7 @@ class SensorSet(Sensors[Any, Any]):
     devices: ClassVar[dict[str, type[Device[Any, Any]]]] = {}
     limits_grid: ClassVar[bool] = True
     estimator: ClassVar[str] = "eskf"
+    imu_filter: ClassVar[str] = "rotor_notch"
     Telemetry = SetSignals
 
     def __init__(self, settings: Any = None) -> None:

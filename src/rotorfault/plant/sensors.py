@@ -44,9 +44,12 @@ class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
     ----------
     estimator : str
         Of a scenario with these sensors that names none.
+    imu_filter : str
+        Likewise.
     """
 
     estimator: ClassVar[str] = "direct"
+    imu_filter: ClassVar[str] = "off"
 
     def model(self, context: Context) -> SensorModel:
         """What the autopilot may believe of the set, as a data sheet says it; nothing, if a part says nothing.

@@ -13,7 +13,7 @@ from rotorfault.model.vehicle import ROTOR_NUMBERS
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.mismatch import ROTOR_FACTORS, Mismatch
 from rotorfault.scenario.part import change_kind, change_preset
-from rotorfault.scenario.sensed import forget_estimator
+from rotorfault.scenario.sensed import forget_what_sensors_asked_for
 from rotorfault.scenario.slots import SLOTS
 
 VECTORS = {name: field.default for name, field in Mismatch.model_fields.items() if isinstance(field.default, tuple)}
@@ -36,7 +36,7 @@ def override_all(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
         *path, last = key.split(".")
         return (len(path), False) if last == "kind" else (len(path) + 1, last != "preset")
 
-    forget_estimator(tables, changes)
+    forget_what_sensors_asked_for(tables, changes)
     for key in sorted(changes, key=outermost_first):
         override(tables, key, changes[key])
 

@@ -39,7 +39,7 @@ from rotorfault.plant.models import PLANT
 from rotorfault.plant.timed import LONGEST_STEP
 from rotorfault.scenario.mismatch import Mismatch
 from rotorfault.scenario.part import Part, field_of
-from rotorfault.scenario.sensed import with_estimator
+from rotorfault.scenario.sensed import with_what_sensors_ask_for
 from rotorfault.scenario.slots import SLOTS
 from rotorfault.scenario.time_grid import require_flyable, require_on_grid
 
@@ -146,7 +146,7 @@ class Scenario(Strict):
     @model_validator(mode="before")
     @classmethod
     def _sensed(cls, tables: Any) -> Any:
-        return with_estimator(tables)
+        return with_what_sensors_ask_for(tables)
 
     @model_validator(mode="after")
     def _consistent(self) -> Scenario:

@@ -1,21 +1,26 @@
-"""The estimator of a scenario that names none: the one that its sensors ask for."""
+"""Estimator and IMU filter of a scenario that names none: those that its sensors ask for."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
+from rotorfault.model.slot import Slot
 from rotorfault.scenario.part import Part, part_from
 from rotorfault.scenario.slots import SLOTS
 
-SENSORS, ESTIMATOR = SLOTS["sensors"], SLOTS["estimator"]
+SENSORS = SLOTS["sensors"]
+ASKED_FOR = (SLOTS["imu_filter"], SLOTS["estimator"])
+"""Slots whose part is the sensors' choice, where a scenario names none."""
 
 
-def estimator_for(sensors: object) -> str:
-    """Name of the estimator that sensors ask for.
+def asked_for(slot: Slot[Any], sensors: object) -> str:
+    """Name of the part that sensors ask for.
 
     Parameters
     ----------
+    slot : Slot
+        One of `ASKED_FOR`.
     sensors : str, mapping or Part
         As a scenario has them; what is wrong with them is said elsewhere.
     """
@@ -24,22 +29,23 @@ def estimator_for(sensors: object) -> str:
         made: object = kind.factory
     else:
         made = SENSORS.registry[kind] if isinstance(kind, str) and kind in SENSORS.registry else None
-    return str(getattr(made, "estimator", ESTIMATOR.default))
+    return str(getattr(made, slot.name, slot.default))
 
 
-def with_estimator(tables: Any) -> Any:
-    """The tables of a scenario with the estimator of its sensors, if they name none."""
+def with_what_sensors_ask_for(tables: Any) -> Any:
+    """The tables of a scenario with the parts that its sensors ask for, where they name none."""
     if not isinstance(tables, Mapping):
         return tables
-    own = tables.get(ESTIMATOR.name, {})
-    wanted = estimator_for(tables.get(SENSORS.name, SENSORS.default))
-    if not isinstance(own, Mapping) or "kind" in own or wanted == ESTIMATOR.default:
-        return tables
-    return {**tables, ESTIMATOR.name: {"kind": wanted, **own}}
+    for slot in ASKED_FOR:
+        own = tables.get(slot.name, {})
+        wanted = asked_for(slot, tables.get(SENSORS.name, SENSORS.default))
+        if isinstance(own, Mapping) and "kind" not in own and wanted != slot.default:
+            tables = {**tables, slot.name: {"kind": wanted, **own}}
+    return tables
 
 
-def forget_estimator(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Drop the estimator that the former sensors asked for, in place, where changes name others and no estimator.
+def forget_what_sensors_asked_for(tables: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Drop the parts that the former sensors asked for, in place, where changes name others and no such part.
 
     Parameters
     ----------
@@ -49,9 +55,11 @@ def forget_estimator(tables: dict[str, Any], changes: Mapping[str, Any]) -> None
         Dotted keys and values.
     """
     heads = {key.partition(".")[0] for key in changes}
-    named = SENSORS.name in changes or f"{SENSORS.name}.kind" in changes
-    if not named or ESTIMATOR.name in heads or ESTIMATOR.name not in tables:
+    if SENSORS.name not in changes and f"{SENSORS.name}.kind" not in changes:
         return
-    former = estimator_for(tables.get(SENSORS.name, SENSORS.default))
-    if tables[ESTIMATOR.name] in (former, part_from(ESTIMATOR, former).as_table()):
-        del tables[ESTIMATOR.name]
+    for slot in ASKED_FOR:
+        if slot.name in heads or slot.name not in tables:
+            continue
+        former = asked_for(slot, tables.get(SENSORS.name, SENSORS.default))
+        if tables[slot.name] in (former, part_from(slot, former).as_table()):
+            del tables[slot.name]

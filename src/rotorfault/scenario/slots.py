@@ -11,7 +11,7 @@ from typing import Any, final
 from rotorfault.autopilot.allocation import ALLOCATION
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
-from rotorfault.autopilot.estimation import ESTIMATOR
+from rotorfault.autopilot.estimation import ESTIMATOR, IMU_FILTER
 from rotorfault.autopilot.response import ON_FAULT
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.model.slot import Slot, slot_of
@@ -93,5 +93,18 @@ class Slots:
 
 
 SLOTS = Slots(
-    (REFERENCE, WIND, FAULT, GROUND, PLANT, SENSORS, ESTIMATOR, DIAGNOSIS, ON_FAULT, CONTROLLER, ALLOCATION)
+    (
+        REFERENCE,
+        WIND,
+        FAULT,
+        GROUND,
+        PLANT,
+        SENSORS,
+        IMU_FILTER,
+        ESTIMATOR,
+        DIAGNOSIS,
+        ON_FAULT,
+        CONTROLLER,
+        ALLOCATION,
+    )
 )

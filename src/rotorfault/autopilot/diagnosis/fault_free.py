@@ -64,7 +64,7 @@ from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, clip, exp, less, select
+from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
@@ -289,9 +289,10 @@ def advance(
 
     seen: list[tuple[Sparse, Innovation]] = []
     variances: list[Scalar] = []
+    shaken, force_shaken = sensed.shaken(inputs)
     for axis, (measured, variance) in enumerate(zip(inputs.estimate.omega_B, memory.noise, strict=True)):
         row = {RATES + axis: 1.0}
-        one = innovation(belief, row, measured, variance)
+        one = innovation(belief, row, measured, maximum(variance, shaken))
         belief = follow(belief, one)
         seen.append((row, one))
         variances.append(sensed.noise_after(variance, one, p.gyroscope, dt * (1.0 - beyond)))
@@ -307,7 +308,8 @@ def advance(
         row = {WIND + k: component * share for k, component in enumerate(level_W[axis])}
         if axis == 2:
             row |= {MASS: -lift, **{LOSSES + i: value for i, value in enumerate(force)}}
-        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, variance + doubt)
+        unsure = maximum(variance, force_shaken) + doubt
+        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, unsure)
         belief = follow(belief, one)
         seen.append((row, one))
         variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))

@@ -76,6 +76,18 @@ def beyond(inputs: DiagnosisInputs, end: Scalar) -> Scalar:
     return greater(largest, end * (1.0 - ROUNDING))
 
 
+def shaken(inputs: DiagnosisInputs) -> tuple[Scalar, Scalar]:
+    """Variances of vibration that a filter has left in rates and specific force at this instant.
+
+    Parameters
+    ----------
+    inputs : DiagnosisInputs
+    """
+    readings = (inputs.readings.rates, inputs.readings.specific_force)
+    rates, force = (one.shaken if isinstance(one, Reading) else 0.0 for one in readings)
+    return rates, force
+
+
 def noise_after(before: Scalar, seen: Innovation, least: Scalar, dt: Scalar) -> Scalar:
     """Variance of a measured number after one more.
 

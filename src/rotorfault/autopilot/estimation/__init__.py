@@ -6,6 +6,20 @@ Importing the package registers every estimator, so that the registry is complet
 from rotorfault.autopilot.estimation.complementary import Complementary
 from rotorfault.autopilot.estimation.direct import Direct
 from rotorfault.autopilot.estimation.eskf import Eskf
+from rotorfault.autopilot.estimation.imu_filter import IMU_FILTER, FilterInputs, ImuFilter, Unfiltered
 from rotorfault.autopilot.estimation.protocol import ESTIMATOR, Estimator, EstimatorInputs
+from rotorfault.autopilot.estimation.rotor_notch import RotorNotch
 
-__all__ = ["ESTIMATOR", "Complementary", "Direct", "Eskf", "Estimator", "EstimatorInputs"]
+__all__ = [
+    "ESTIMATOR",
+    "IMU_FILTER",
+    "Complementary",
+    "Direct",
+    "Eskf",
+    "Estimator",
+    "EstimatorInputs",
+    "FilterInputs",
+    "ImuFilter",
+    "RotorNotch",
+    "Unfiltered",
+]
