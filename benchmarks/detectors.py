@@ -1,13 +1,14 @@
 """Which detector names the right rotor, how soon, and how often is a sound one blamed? All on the same flights.
 
     python benchmarks/detectors.py [--flights 200] [--hours 1] [--vehicles ...] [--detectors ...] [--vibration]
+        [--rotor-speeds]
 
 ``losses``: hover in gusts of 8 m/s; rotor 2 loses a share at 1.0 to 1.5 s. ``healthy``: hover, 4 m squares with
 little time, forward flight at 10 m/s, all in the same gusts, and the last two with a gust front besides. In all of
 them the true vehicle is not the believed one: mass by up to 10 %, inertia by 20 %, lag by 25 %, centre of mass by 1
 cm (at most a quarter of the arm) along x and y. Sensors and estimator are real (`mocap`, `gps-consumer`, `crazyflie`
 with `eskf`), or `noisy` and `direct` with ``--sensors noisy``; ``--vibration`` adds 0.3 rad/s and 5 m/s^2 at the
-rotors' frequency.
+rotors' frequency, ``--rotor-speeds`` has the sensors measure them.
 
 Right is a flight in which the rotor was flagged and no other had been. The interval of false alarms per hour is that
 of a Poisson count, exact, 95 %.
@@ -66,11 +67,12 @@ def mismatch(vehicle: str, flights: int, seed: int) -> dict[str, Array]:
 def tables(vehicle: str, detector: str, chosen: argparse.Namespace) -> dict[str, Any]:
     """What all flights of a vehicle have in common."""
     preset, sensors = VEHICLES[vehicle]
-    imu = {"imu": {"gyro_vibration": 0.3, "accelerometer_vibration": 5.0}} if chosen.vibration else {}
+    more = {"imu": {"gyro_vibration": 0.3, "accelerometer_vibration": 5.0}} if chosen.vibration else {}
+    more |= {"rotor_speeds": {"on": True}} if chosen.rotor_speeds else {}
     noisy = chosen.sensors == "noisy"
     return {
         "name": "detectors", "vehicle": vehicle, "period": 0.001, "diagnosis": detector,
-        "sensors": "noisy" if noisy else {"kind": sensors, **imu},
+        "sensors": "noisy" if noisy else {"kind": sensors, **more},
         "estimator": "direct" if noisy else "eskf",
         "controller": {"kind": "roismc", "preset": preset},
         "wind": {"kind": "dryden", "wind_at_6m": 8.0, "velocity_W": [-7.0, 3.0, 0.0]},
@@ -142,6 +144,7 @@ def main() -> None:
     parser.add_argument("--detectors", nargs="+", default=list(DETECTORS), choices=list(DETECTORS))
     parser.add_argument("--sensors", default="real", choices=("real", "noisy"))
     parser.add_argument("--vibration", action="store_true")
+    parser.add_argument("--rotor-speeds", action="store_true")
     parser.add_argument("--only", choices=("losses", "healthy"))
     chosen = parser.parse_args()
     for vehicle in chosen.vehicles:
