@@ -66,6 +66,11 @@ class Autopilot:
         diagnoser = next((part for slot, part in self.parts.items() if slot.name == "diagnosis"), None)
         return diagnoser if isinstance(diagnoser, Oracle) else None
 
+    @property
+    def asked(self) -> bool:
+        """Whether a part asks what thrust the rotors are believed to have given."""
+        return any(getattr(part, "asks_for_thrust", False) for part in self.parts.values())
+
     def initial(
         self, readings: Readings, reference: Reference, vehicle: Vehicle, parameters: Any, dt: Scalar
     ) -> AutopilotMemory:
@@ -88,6 +93,8 @@ class Autopilot:
         held = hover / vehicle.rotor_gain
         rotors = rotors_at_hover(vehicle)
         past = Past(rotors, (), Command(held, zeros()), 0.0, rotor_speeds(vehicle, expected_thrust(rotors, vehicle)))
+        if self.asked:
+            past = past._replace(believed=rotors.mean)
         instant = Instant(readings, reference, vehicle, past, dt)
         # What the parts would say before anything is known: hover with sound rotors.
         wrench, sound = Wrench(hover.sum(), zeros()), healthy(vehicle.rotors)
@@ -158,12 +165,15 @@ class Autopilot:
             wrench = instant.demand
         allocation = self._relieved(instant, wrench)
         command = Command(allocation.command, instant.outputs["controller"].direct_acceleration_W)
+        rotors = follow(memory.past.rotors, command.thrust, vehicle, dt)
+        believed = instant.decision.diagnosis
         past = Past(
-            rotors=follow(memory.past.rotors, command.thrust, vehicle, dt),
+            rotors=rotors,
             previous=instant.expectation.now,
             command=command,
             elapsed=dt,
             speed=instant.expectation.speed,
+            believed=believed.stuck.thrust_of(rotors.mean, believed.loss) if self.asked else (),
         )
         report = AutopilotReport(instant, wrench, allocation, telemetry)
         return AutopilotMemory(past, self._record(*memories)), command, report

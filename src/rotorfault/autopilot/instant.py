@@ -44,6 +44,7 @@ class Past(NamedTuple):
     command: Command  # sent last; hover before the first
     elapsed: Scalar  # s since the last instant; 0 before the first, so that nothing is predicted there
     speed: PerRotor  # rad/s: of sound rotors at the last instant
+    believed: PerRotor | tuple[()] = ()  # N: of the rotors as believed, over the last period; empty if nobody asks
 
 
 class Decision(NamedTuple):

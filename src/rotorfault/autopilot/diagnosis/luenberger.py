@@ -30,6 +30,7 @@ from typing import Annotated, Literal, NamedTuple, final
 
 from pydantic import Field, field_validator
 
+from rotorfault.autopilot.diagnosis import sensed
 from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
@@ -108,6 +109,7 @@ class LuenbergerParameters(NamedTuple):
     decay: Scalar  # what remains of a deviation over one period: 1 but for `lag_states`
     dynamics: Dynamics  # L_1, innovation to rate, and L_2, to deviation acceleration, and what follows from them
     decision: DecisionParameters
+    end: Scalar | tuple[()] = ()  # rad/s: of the gyroscope's range
 
 
 class LuenbergerSignals(NamedTuple):
@@ -191,9 +193,8 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         dynamics = Dynamics(*gains, noise_gain(*gains, period), math.exp(-w * period))
         shown, decision = SHOWN / min(p, q), self.settings.decision
         stuck = StuckParameters(shown, decision.clear_threshold)
-        return LuenbergerParameters(
-            carry, decay, dynamics, decision_parameters(decision, 1.0 / p + 1.0 / q, SHOWN / w + shown, stuck)
-        )
+        decided = decision_parameters(decision, 1.0 / p + 1.0 / q, SHOWN / w + shown, stuck)
+        return LuenbergerParameters(carry, decay, dynamics, decided, sensed.end_of_range(context))
 
     def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
         """Start at the estimated rates without deviation."""
@@ -223,6 +224,13 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
+        if (unread := sensed.unread(inputs, parameters.end)) is not None:
+            # The observer follows what the estimator makes up, and learns nothing from it: believed losses stay.
+            innovation = innovation - innovation.times(unread)
+            omega_B = omega_B + (now.omega_B - omega_B).times(unread)
+            missing = inputs.expectation.thrust * (memory.decision.smoothed * memory.decision.flagged)
+            believed = over_inertia(vehicle, wrench_of(vehicle, -missing).torque_B)
+            delta_omega = delta_omega + (believed - delta_omega).times(unread)
         delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)

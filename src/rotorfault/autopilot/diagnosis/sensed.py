@@ -19,7 +19,8 @@ import math
 
 from rotorfault.autopilot.diagnosis.kalman import Innovation
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
-from rotorfault.maths.scalar import Scalar, absolute, greater, maximum, minimum
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.scalar import Scalar, absolute, either, greater, maximum, minimum
 from rotorfault.model.block import Context
 from rotorfault.model.sensor_model import SensorNoise
 from rotorfault.model.signals import Reading
@@ -62,7 +63,7 @@ def end_of_range(context: Context) -> Scalar | tuple[()]:
 
 
 def beyond(inputs: DiagnosisInputs, end: Scalar) -> Scalar:
-    """1 where the gyroscope is at an end of its range about any axis, else 0.
+    """1 where the gyroscope is silent, or at an end of its range about any axis, else 0.
 
     Parameters
     ----------
@@ -73,7 +74,30 @@ def beyond(inputs: DiagnosisInputs, end: Scalar) -> Scalar:
     reading = inputs.readings.rates
     x, y, z = reading.value if isinstance(reading, Reading) else inputs.estimate.omega_B
     largest = maximum(maximum(absolute(x), absolute(y)), absolute(z))
-    return greater(largest, end * (1.0 - ROUNDING))
+    at_end = greater(largest, end * (1.0 - ROUNDING))
+    return either(at_end, 1.0 - reading.valid) if isinstance(reading, Reading) else at_end
+
+
+def unread(inputs: DiagnosisInputs, end: Scalar | tuple[()]) -> Vec3 | None:
+    """1 for each axis whose rate the gyroscope does not tell, else 0; None where it always tells all.
+
+    What an estimator makes up for such a rate follows from what is believed of the rotors, so it is no evidence.
+
+    Parameters
+    ----------
+    inputs : DiagnosisInputs
+    end : scalar, rad/s
+        From `end_of_range`.
+    """
+    reading = inputs.readings.rates
+    if not isinstance(reading, Reading):
+        return None
+    silent = 1.0 - reading.valid
+    if isinstance(end, tuple):
+        return None if isinstance(silent, float) and silent == 0.0 else Vec3(silent, silent, silent)
+    limit = end * (1.0 - ROUNDING)
+    axes: Vec3 = reading.value.map(lambda one: either(greater(absolute(one), limit), silent))
+    return axes
 
 
 def shaken(inputs: DiagnosisInputs) -> tuple[Scalar, Scalar]:

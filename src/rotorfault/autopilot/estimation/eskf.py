@@ -19,13 +19,14 @@ sensors have them, are states too (Gauss-Markov). Measurements are taken in one 
 what is believed of the sensors (`rotorfault.model.sensor_model`), nothing is tuned.
 
 Departures: the covariance takes the mean state over a period, and of a late measurement the lever of its velocity
-over the delay, not its history. A rate beyond the gyro's range is not known: while a reading is at its end, the
-attitude blurs by `saturated`.
+over the delay, not its history. A rate beyond the gyro's range, or that of a silent gyro, is a state that the
+believed motion carries on (`rotorfault.autopilot.estimation.unread`); with `beyond_range = "hold"` the reading is
+taken as it is, and while it is at its end the attitude blurs by `saturated`.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, final
+from typing import Annotated, Any, Literal, NamedTuple, final
 
 from pydantic import Field
 
@@ -35,11 +36,22 @@ from rotorfault.autopilot.estimation.covariance import Filter
 from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs, required
 from rotorfault.autopilot.estimation.start import first_attitude, first_filter
 from rotorfault.autopilot.estimation.states import ERROR, FORCE_BIAS, GYRO_BIAS, P, States, V
+from rotorfault.autopilot.estimation.unread import (
+    AT_END,
+    Unread,
+    all_read,
+    carried_on,
+    handed_over,
+    kept,
+    noise_of_rates,
+    not_read,
+    rate_of,
+)
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.rotation import Quat
-from rotorfault.maths.scalar import Scalar, absolute, exp, greater, maximum, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, exp, greater, maximum, negated, select, sqrt
 from rotorfault.model.block import Context, Record
 from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
 from rotorfault.model.signals import Deviations, Estimate, Reading
@@ -53,6 +65,7 @@ class EskfSignals(NamedTuple):
     position_std: Annotated[Vec3, Quantity("m", WORLD, "standard deviation of the estimated position")]
     velocity_std: Annotated[Vec3, Quantity("m/s", WORLD, "standard deviation of the estimated velocity")]
     attitude_std: Annotated[Vec3, Quantity("rad", WORLD, "its standard deviation, about the world's axes")]
+    rates_std: Annotated[Vec3, Quantity("rad/s", BODY, "standard deviation of the estimated rates")]
     gyro_bias: Annotated[Vec3, Quantity("rad/s", BODY, "estimated bias of the gyro")]
     gyro_bias_std: Annotated[Vec3, Quantity("rad/s", BODY, "its standard deviation")]
     accelerometer_bias: Annotated[Vec3, Quantity("m/s^2", BODY, "estimated bias of the accelerometer")]
@@ -70,6 +83,7 @@ class EskfParameters(NamedTuple):
     start_tilt: Scalar  # rad
     start_speed: Scalar  # m/s
     saturated: Scalar  # rad/s/sqrt(Hz)
+    turning_noise: Vec3 | tuple[()]  # rad/s^2/sqrt(Hz): of rates that are carried on; empty if none are
 
 
 class EskfMemory(NamedTuple):
@@ -87,6 +101,7 @@ class EskfMemory(NamedTuple):
     behind: tuple[Moved, ...]
     floor: Scalar  # m: height of the ground, as first seen and corrected since
     count: Scalar  # sampling instants so far
+    unread: Unread | tuple[()] = ()  # of rates that the gyro does not tell; empty if they are taken as read
 
 
 def timing_of_fix(sensors: SensorModel) -> Timing:
@@ -113,16 +128,37 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         start_speed: float = Field(
             0.1, gt=0.0, le=100.0, description="standard deviation of the first velocity, if none is measured [m/s]"
         )
-        saturated: float = Field(
-            0.3, ge=0.0, le=100.0, description="noise density of a rate beyond the gyro's range [rad/s/sqrt(Hz)]"
+        beyond_range: Literal["model", "hold"] = Field(
+            "model",
+            description="a rate beyond the gyro's range, or of a silent gyro: `model` carries it on by the believed "
+            "motion, `hold` takes it as it is read",
         )
+        unknown_torque: float = Field(
+            0.1,
+            gt=0.0,
+            le=10.0,
+            description="with `model`: error of the believed torque over those of the rotors in hover; our estimate: "
+            "what thrust and drag of a rotor are known to",
+        )
+        saturated: float = Field(
+            0.3,
+            ge=0.0,
+            le=100.0,
+            description="with `hold`: noise density of a rate beyond the gyro's range [rad/s/sqrt(Hz)]",
+        )
+
+    @property
+    def asks_for_thrust(self) -> bool:
+        """Whether it carries rates on by the thrust of the believed rotors."""
+        return bool(self.settings.beyond_range == "model")
 
     def parameters(self, context: Context) -> EskfParameters:
         """What is believed of the sensors, and the settings."""
         sensors, s = context.sensors, self.settings
         if not isinstance(sensors, SensorModel):
             sensors = SensorModel()
-        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated)
+        turning = noise_of_rates(context.vehicle, s.unknown_torque) if self.asks_for_thrust else ()
+        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning)
 
     def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:
         """From the first readings alone."""
@@ -148,6 +184,9 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             none_yet(timing_of_fix(sensors)),
             floor,
             0.0,
+            all_read(_noise(sensors.rates).bias, inputs.believed_thrust, inputs.vehicle)
+            if self.asks_for_thrust
+            else (),
         )
 
     def step(
@@ -158,7 +197,12 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         states = States.of(sensors)
         running = greater(memory.count, 0.5)  # at the first instant no time has gone by, and all is read already
         spell = dt * running
-        rates = required(readings, "rates", "eskf").value - memory.gyro_bias
+        gyro = required(readings, "rates", "eskf")
+        rates, unread, moving = gyro.value - memory.gyro_bias, None, memory.unread
+        if isinstance(memory.unread, Unread):
+            at_end, unread = not_read(gyro, _noise(sensors.rates))
+            carried, moving = carried_on(memory.unread, memory.rates, inputs.believed_thrust, inputs.vehicle, spell)
+            rates = rate_of(rates, carried, gyro.value, at_end, unread)
         force = required(readings, "specific_force", "eskf").value - memory.force_bias
         force = force - rates.cross(rates.cross(sensors.imu_at_B))
         # The mean of both ends of the period, which is what a sampled reading stands for.
@@ -172,7 +216,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         moved = (memory.v_W + gained * 0.5) * spell
         p_W, v_W = memory.p_W + moved, memory.v_W + gained
         filter_ = Filter(memory.covariance, states.number)
-        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, readings.rates)
+        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, gyro, unread)
         timing = timing_of_fix(sensors)
         behind = moved_on(memory.behind, moved, gained, turn, timing, memory.count)
         belief = measurements.Belief(p_W, v_W, q_WB, R, rates, slow, memory.floor, gravity)
@@ -183,7 +227,10 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         speed = _three(error, V)
         small = turn_by(_three(error, ERROR))
         q_WB = (small @ q_WB).normalised()
-        gyro_bias = memory.gyro_bias + _three(error, GYRO_BIAS)
+        off = _three(error, GYRO_BIAS)
+        if unread is not None:
+            rates, off = rates - off.times(unread), off.times(unread.map(negated))
+        gyro_bias = memory.gyro_bias + off
         force_bias = memory.force_bias + _three(error, FORCE_BIAS)
         after = EskfMemory(
             p_W + _three(error, P),
@@ -198,28 +245,32 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             corrected(behind, speed, timing, memory.count, dt),
             memory.floor if states.floor is None else memory.floor + error[states.floor],
             memory.count + 1.0,
+            moving
+            if unread is None or not isinstance(moving, Unread)
+            else kept(filter_, moving, unread, _noise(sensors.rates).bias_walk, spell),
         )
-        deviations = self._deviations(filter_, sensors)
+        deviations = self._deviations(filter_, sensors, after.unread)
         estimate = Estimate(
             after.p_W, after.v_W, q_WB, rates, force,
             gyro_bias=gyro_bias, accelerometer_bias=force_bias, std=deviations,
         )  # fmt: skip
         signals = EskfSignals(
-            deviations.p_W, deviations.v_W, deviations.attitude_W, gyro_bias, _there(deviations.gyro_bias),
-            force_bias, _there(deviations.accelerometer_bias), innovation, filter_.squares, filter_.measured,
+            deviations.p_W, deviations.v_W, deviations.attitude_W, deviations.omega_B,
+            gyro_bias, _there(deviations.gyro_bias), force_bias, _there(deviations.accelerometer_bias),
+            innovation, filter_.squares, filter_.measured,
         )  # fmt: skip
         return after, estimate, signals
 
     @staticmethod
     def _predict(
         filter_: Filter, memory: EskfMemory, parameters: EskfParameters, R: Mat3, force_W: Vec3, spell: Scalar,
-        running: Scalar, gyro: Any,
+        running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None,
     ) -> tuple[Any, ...]:  # fmt: skip
         """The covariance a period later, and the slow errors."""
         sensors = parameters.sensors
-        rates, force = sensors.rates, sensors.specific_force
-        assert isinstance(rates, SensorNoise)
-        assert isinstance(force, SensorNoise)
+        rates, force = _noise(sensors.rates), _noise(sensors.specific_force)
+        if unread is not None and isinstance(memory.unread, Unread):
+            handed_over(filter_, memory.unread, unread, rates)
         filter_.move({P + i: {V + i: spell} for i in range(3)})
         f, rows = force_W * spell, (R * -spell).rows
         lean = ({1: f.z, 2: -f.y}, {0: -f.z, 2: f.x}, {0: f.y, 1: -f.x})  # theta x f
@@ -231,17 +282,19 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         )
         filter_.move({ERROR + i: {GYRO_BIAS + j: c for j, c in enumerate(rows[i])} for i in range(3)})
         # A reading that is held over several instants is off by the same in each.
-        x, y, z = (absolute(one) for one in gyro.value)
-        at_end = maximum(maximum(x, y), z)
-        beyond = greater(at_end, rates.limit * (1.0 - 1e-9))
-        blur = (
-            rates.std * rates.std * rates.timing.every * spell + beyond * parameters.saturated * parameters.saturated
-        )
-        for i in range(3):
+        blur, walk = rates.std * rates.std * rates.timing.every * spell, rates.bias_walk * rates.bias_walk
+        if unread is None:
+            x, y, z = (absolute(one) for one in gyro.value)
+            beyond = greater(maximum(maximum(x, y), z), rates.limit * AT_END)
+            blur = blur + beyond * parameters.saturated * parameters.saturated
+            walks = Vec3(walk, walk, walk)
+        else:
+            walks = Vec3.of(select(on, q * q, walk) for on, q in zip(unread, parameters.turning_noise, strict=True))
+        for i, drift in enumerate(walks):
             filter_.blur(V + i, force.std * force.std * force.timing.every * spell * spell)
             filter_.blur(ERROR + i, blur * spell)
             filter_.blur(FORCE_BIAS + i, force.bias_walk * force.bias_walk * spell)
-            filter_.blur(GYRO_BIAS + i, rates.bias_walk * rates.bias_walk * spell)
+            filter_.blur(GYRO_BIAS + i, drift * spell)
         slow = []
         for group, value in zip(States.of(sensors).slow, memory.slow, strict=True):
             noise = group.noise
@@ -253,25 +306,30 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         return tuple(slow)
 
     @staticmethod
-    def _deviations(filter_: Filter, sensors: SensorModel) -> Deviations:
+    def _deviations(filter_: Filter, sensors: SensorModel, unread: Any) -> Deviations:
         """Standard deviations of what is estimated."""
-        rates, force = sensors.rates, sensors.specific_force
-        assert isinstance(rates, SensorNoise)
-        assert isinstance(force, SensorNoise)
+        rates, force = _noise(sensors.rates), _noise(sensors.specific_force)
 
         def std(first: int, more: Scalar = 0.0) -> Vec3:
             return Vec3(*(sqrt(maximum(filter_[i, i], 0.0) + more) for i in range(first, first + 3)))
 
         gyro = rates.std * rates.std + 0.5 * rates.vibration * rates.vibration
         felt = force.std * force.std + 0.5 * force.vibration * force.vibration
+        bias = std(GYRO_BIAS) if unread == () else unread.bias_variance.map(lambda one: sqrt(maximum(one, 0.0)))
         return Deviations(
-            std(P), std(V), std(ERROR), std(GYRO_BIAS, gyro), std(FORCE_BIAS, felt), std(GYRO_BIAS), std(FORCE_BIAS)
+            std(P), std(V), std(ERROR), std(GYRO_BIAS, gyro), std(FORCE_BIAS, felt), bias, std(FORCE_BIAS)
         )
 
 
 def turn_by(rotation: Vec3) -> Quat:
     """The rotation by a small vector in rad, to the fifth power of its angle."""
     return Quat.small(rotation * (1.0 + rotation.dot(rotation) * (1.0 / 12.0)))
+
+
+def _noise(sensor: object) -> SensorNoise:
+    """Of a sensor that the filter cannot do without."""
+    assert isinstance(sensor, SensorNoise)
+    return sensor
 
 
 def _there(value: Vec3 | tuple[()]) -> Vec3:

@@ -20,6 +20,12 @@ class EstimatorInputs(NamedTuple):
     readings: Readings
     vehicle: Vehicle  # belief
     command: PerRotor  # N, sent at the last instant
+    thrust: PerRotor | tuple[()] = ()  # N: of the believed rotors since then; empty unless `asks_for_thrust`
+
+    @property
+    def believed_thrust(self) -> PerRotor:
+        """Thrust of the believed rotors over the last period in N; what was commanded, where nothing else is told."""
+        return self.thrust if isinstance(self.thrust, PerRotor) else self.command
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -28,9 +34,15 @@ class EstimatorInputs(NamedTuple):
 class Estimator(Block[EstimatorInputs, Estimate, MemoryT, ParametersT]):
     """Turns readings into an estimate of position, velocity, attitude and rates."""
 
+    @property
+    def asks_for_thrust(self) -> bool:
+        """Whether it is told what the believed rotors gave since the last instant; it costs memory."""
+        return False
+
 
 def _inputs(instant: Instant) -> EstimatorInputs:
-    return EstimatorInputs(instant.readings, instant.vehicle, instant.past.command.thrust)
+    past = instant.past
+    return EstimatorInputs(instant.readings, instant.vehicle, past.command.thrust, past.believed)
 
 
 ESTIMATOR = Slot(
