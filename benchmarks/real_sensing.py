@@ -44,13 +44,15 @@ FAULTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "position silent 5 s": (SILENT, ("mocap", "gps-consumer")),
     "magnetometer frozen 5 s": (FROZEN, ("gps-consumer",)),
 }
-SPINNERS = {("mueller-2014", "hummingbird"): (0.25, 0.5, 1.0, 2.0), ("hummingbird", "hummingbird"): (1.0,)}
+SPINNERS = {("mueller-2014", "hummingbird"): (0.125, 0.25, 0.5, 1.0, 2.0), ("hummingbird", "hummingbird"): (1.0,)}
 """Vehicles with a preset, and by what the air's brake on the spin is multiplied."""
+HELD = {"kind": "eskf", "beyond_range": "hold"}
 SPIN_SETS: dict[str, dict[str, Any]] = {
     "noisy": {"sensors": "noisy"},
     "mocap": {"sensors": "mocap"},
-    "mocap, gyro to 4000 deg/s": {"sensors": {"kind": "mocap", "imu": {"gyro_range": 69.8}}},
+    "mocap, rate held": {"sensors": "mocap", "estimator": HELD},
     "gps-consumer": {"sensors": "gps-consumer"},
+    "gps-consumer, rate held": {"sensors": "gps-consumer", "estimator": HELD},
 }
 
 

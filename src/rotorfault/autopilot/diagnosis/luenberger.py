@@ -58,7 +58,7 @@ from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, maximum
+from rotorfault.maths.scalar import Scalar, either, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
@@ -131,6 +131,7 @@ class LuenbergerMemory(NamedTuple):
     model_error: ModelErrorMemory
     decision: DecisionMemory
     stuck: PerRotor  # 1 where a rotor was last believed not to follow
+    unread: Vec3 | tuple[()]  # 1 for an axis whose rate was not read at the last instant; empty if all always are
 
 
 def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[float, float]:
@@ -207,6 +208,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             nothing_shown(inputs.vehicle.rotors),
             undecided(inputs.vehicle.rotors, hover_thrust(inputs.vehicle).sum() / inputs.vehicle.rotors),
             PerRotor.all(0.0, inputs.vehicle.rotors),
+            () if sensed.unread(inputs, parameters.end) is None else zeros(),
         )
 
     def step(
@@ -224,13 +226,16 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         delta_z, delta_omega = memory.delta_z * parameters.decay, memory.delta_omega * parameters.decay
 
         innovation_z, innovation = now.v_W.z - climb, now.omega_B - omega_B
-        if (unread := sensed.unread(inputs, parameters.end)) is not None:
-            # The observer follows what the estimator makes up, and learns nothing from it: believed losses stay.
-            innovation = innovation - innovation.times(unread)
-            omega_B = omega_B + (now.omega_B - omega_B).times(unread)
+        unread = sensed.unread(inputs, parameters.end)
+        if unread is not None and isinstance(memory.unread, Vec3):
+            # The observer follows what the estimator makes up, and learns nothing from it, nor from the first reading
+            # after, which tells how wrong that was: believed losses stay.
+            blind = Vec3.of(map(either, unread, memory.unread))
+            innovation = innovation - innovation.times(blind)
+            omega_B = omega_B + (now.omega_B - omega_B).times(blind)
             missing = inputs.expectation.thrust * (memory.decision.smoothed * memory.decision.flagged)
             believed = over_inertia(vehicle, wrench_of(vehicle, -missing).torque_B)
-            delta_omega = delta_omega + (believed - delta_omega).times(unread)
+            delta_omega = delta_omega + (believed - delta_omega).times(blind)
         delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
@@ -246,6 +251,7 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             model_error=wrong,
             decision=decision,
             stuck=diagnosis.stuck.rotor,
+            unread=() if unread is None else unread,
         )
         return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test, diagnosis.stuck.thrust)
 

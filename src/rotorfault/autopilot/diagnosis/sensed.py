@@ -79,23 +79,20 @@ def beyond(inputs: DiagnosisInputs, end: Scalar) -> Scalar:
 
 
 def unread(inputs: DiagnosisInputs, end: Scalar | tuple[()]) -> Vec3 | None:
-    """1 for each axis whose rate the gyroscope does not tell, else 0; None where it always tells all.
+    """1 for each axis whose rate the gyroscope does not tell, else 0; None of sensors whose record names no range.
 
     What an estimator makes up for such a rate follows from what is believed of the rotors, so it is no evidence.
 
     Parameters
     ----------
     inputs : DiagnosisInputs
-    end : scalar, rad/s
+    end : scalar, rad/s, or empty
         From `end_of_range`.
     """
     reading = inputs.readings.rates
-    if not isinstance(reading, Reading):
+    if isinstance(end, tuple) or not isinstance(reading, Reading):
         return None
-    silent = 1.0 - reading.valid
-    if isinstance(end, tuple):
-        return None if isinstance(silent, float) and silent == 0.0 else Vec3(silent, silent, silent)
-    limit = end * (1.0 - ROUNDING)
+    silent, limit = 1.0 - reading.valid, end * (1.0 - ROUNDING)
     axes: Vec3 = reading.value.map(lambda one: either(greater(absolute(one), limit), silent))
     return axes
 
