@@ -1,6 +1,6 @@
 """What real sensing costs: the paper's three cases, faults of sensors, and the spin after a total loss.
 
-    python benchmarks/real_sensing.py [--flights 50] [--only paper faults spin] [--tracking so3] [--json FILE]
+    python benchmarks/real_sensing.py [--flights 50] [--only paper faults spin known] [--tracking so3] [--json FILE]
 
 *paper*: the three cases of the paper (set point, sinusoid, square) with each set of sensors, the plant being
 `rigid_body`: the paper's model takes Euler rates for body rates, which no gyro measures. Flights that survive, error
@@ -12,7 +12,12 @@ by 5 deg/s about x, satellites or cameras are silent for 5 s, the magnetometer f
 distance from the reference.
 
 *spin*: rotor 1 stops at 1 s, in wind of 5 m/s with gusts, by relaxed hover; the fastest yaw rate there was in flights
-that survive beside the end of the gyro's range, 34.9 rad/s.
+that survive beside the end of the gyro's range, 34.9 rad/s; also with `beyond_range = "hold"` of the filter.
+
+*known*: the same, and how well the estimator knows it from 6 s on: error of yaw rate and attitude (root mean square,
+median flight); the squared error of the yaw rate over its believed variance, mean of all flights (1 if it is as sure
+as it should be); and the amplitude, at the frequency of the spin, of the true position and of the error of the
+estimated one, horizontally. With the believed vehicle right, and with its inertia wrong.
 
 Intervals are Clopper and Pearson's, 95 %.
 """
@@ -28,11 +33,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import rotorfault as rf
 from rotorfault.base.files import write_durably
 from rotorfault.campaigns.sampling.statistics import clopper_pearson
 
+Array = NDArray[np.float64]
+RECORDED = 0.005  # s between two records of a spin
 CASES = ("paper-set-point", "paper-sinusoid", "paper-square")
 SETS = ("ideal", "noisy", "mocap", "gps-consumer", "crazyflie")
 JUMP = {"kind": "sensor_bias", "sensor": "gyro", "time": 3.0, "bias": [0.0873, 0.0, 0.0]}
@@ -119,29 +127,76 @@ def faults(flights: int) -> dict[str, Any]:
     }
 
 
+def spinning(vehicle: str, preset: str, factor: float) -> dict[str, Any]:
+    """Settings of a total loss whose spin the air brakes so many times as it does."""
+    given = rf.load_scenario("hover-fault", {"vehicle": vehicle}).vehicle.air
+    settings: dict[str, Any] = {
+        "vehicle": vehicle, "controller.preset": preset, "duration": 15.0,
+        "start.position": [0.0, 0.0, 10.0], "reference.position": [0.0, 0.0, 10.0],
+        "wind": {"kind": "dryden", "wind_at_6m": 5.0, "velocity_W": [5.0, 0.0, 0.0], "altitude": 10.0},
+        "fault": [{"kind": "total", "rotor": 1, "time": 1.0}],
+    }  # fmt: skip
+    if given is not None and given.damping_yaw is not None:
+        settings["vehicle.air.damping_yaw.value"] = factor * given.damping_yaw.value
+    else:
+        drag = {"value": factor * 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}
+        settings["vehicle.air.rotor_drag"] = drag
+    return settings
+
+
 def spin(flights: int) -> dict[str, Any]:
     """Total loss of a rotor, by set of sensors and by how much the air brakes the spin."""
+    return {
+        f"{vehicle}, braked {factor:g} times, {sensors}": flown(
+            "hover-fault", spinning(vehicle, preset, factor) | SPIN_SETS[sensors], flights
+        )
+        for (vehicle, preset), factors in SPINNERS.items()
+        for factor, sensors in itertools.product(factors, SPIN_SETS)
+    }
+
+
+def known(flights: int) -> dict[str, Any]:
+    """How well a spin is known."""
     found = {}
-    for (vehicle, preset), factors in SPINNERS.items():
-        for factor, sensors in itertools.product(factors, SPIN_SETS):
-            given = rf.load_scenario("hover-fault", {"vehicle": vehicle}).vehicle.air
-            settings: dict[str, Any] = {
-                "vehicle": vehicle, "controller.preset": preset, "duration": 15.0, **SPIN_SETS[sensors],
-                "start.position": [0.0, 0.0, 10.0], "reference.position": [0.0, 0.0, 10.0],
-                "wind": {"kind": "dryden", "wind_at_6m": 5.0, "velocity_W": [5.0, 0.0, 0.0], "altitude": 10.0},
-                "fault": [{"kind": "total", "rotor": 1, "time": 1.0}],
-            }  # fmt: skip
-            if given is not None and given.damping_yaw is not None:
-                settings["vehicle.air.damping_yaw.value"] = factor * given.damping_yaw.value
-            else:
-                drag = {"value": factor * 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}
-                settings["vehicle.air.rotor_drag"] = drag
-            name = f"{vehicle}, braked {factor:g} times, {sensors}"
-            found[name] = flown("hover-fault", settings, flights)
+    for factor, sensors, inertia in itertools.product((0.25, 0.5, 1.0), ("mocap", "gps-consumer"), (1.0, 0.8, 1.2)):
+        settings = spinning("mueller-2014", "hummingbird", factor) | {
+            "sensors": sensors,
+            "mismatch.inertia": [inertia] * 3,
+        }
+        record = (
+            "position", "position_estimated", "quaternion", "quaternion_estimated", "body_rates.z",
+            "body_rates_estimated.z", "estimator.rates_std.z",
+        )  # fmt: skip
+        many = rf.fly_many(
+            "hover-fault", {"seed": range(1, flights + 1)}, settings=settings, record=record,
+            record_period=RECORDED, warn=False,
+        )  # fmt: skip
+        late = many.signals[round(6.0 / RECORDED) :]
+        late = late[:, :, ~np.isnan(late).any(axis=(0, 1))]
+        place, off = late[:, 0:3], late[:, 3:6] - late[:, 0:3]
+        turned = 2.0 * np.arccos(np.clip(np.abs((late[:, 6:10] * late[:, 10:14]).sum(axis=1)), 0.0, 1.0))
+        rate, wrong = late[:, 14], late[:, 15] - late[:, 14]
+        carrier = np.exp(-1j * np.cumsum(rate, axis=0) * RECORDED)[:, None]
+        found[f"braked {factor:g} times, {sensors}, inertia {inertia:g}"] = {
+            "flights": late.shape[2],
+            "rate": float(np.median(np.abs(rate))),
+            "rate_error": float(np.median(np.sqrt((wrong**2).mean(axis=0)))),
+            "attitude_error": float(np.median(np.sqrt((turned**2).mean(axis=0)))),
+            "squares": float(((wrong / late[:, 16]) ** 2).mean()),
+            "wobble": float(np.median(waves(place, carrier))),
+            "wobble_of_error": float(np.median(waves(off, carrier))),
+        }
     return found
 
 
-PARTS: dict[str, Callable[..., dict[str, Any]]] = {"paper": paper, "faults": faults, "spin": spin}
+def waves(place: Array, carrier: Array) -> Array:
+    """Amplitude in m, horizontally, of what goes round with the spin: (times, axes, flights) to (flights,)."""
+    along = place[:, :2] - place[:, :2].mean(axis=0)
+    size: Array = np.sqrt((np.abs(2.0 * (along * carrier).mean(axis=0)) ** 2).sum(axis=0))
+    return size
+
+
+PARTS: dict[str, Callable[..., dict[str, Any]]] = {"paper": paper, "faults": faults, "spin": spin, "known": known}
 
 
 def main() -> None:
@@ -156,6 +211,15 @@ def main() -> None:
     for part in chosen.only:
         more = {"tracking": chosen.tracking} if part == "paper" else {}
         results[part] = PARTS[part](chosen.flights, **more)
+        if part == "known":
+            print(f"\n{part:46s} yaw rad/s  error   squares  attitude mrad  at the spin: position mm, its error mm")
+            for name, row in results[part].items():
+                print(
+                    f"{name:46s} {row['rate']:9.1f} {row['rate_error']:6.3f} {row['squares']:9.2f} "
+                    f"{1e3 * row['attitude_error']:14.1f} {1e3 * row['wobble']:20.2f} "
+                    f"{1e3 * row['wobble_of_error']:14.2f}"
+                )
+            continue
         print(f"\n{part:48s} survived (95 %)             error m  farthest m   cost J  yaw rad/s (lost)")
         for name, row in results[part].items():
             share = f"{row['survived']}/{row['flights']} ({100 * row['low']:.1f} to {100 * row['high']:.1f} %)"

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import rotorfault as rf
 from rotorfault.autopilot.estimation import Eskf, EstimatorInputs
 from rotorfault.autopilot.estimation.covariance import Filter
-from rotorfault.autopilot.estimation.unread import noise_of_rates
+from rotorfault.autopilot.estimation.unread import TurningNoise, turning_noise
 from rotorfault.engine import have_simd
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.rotation import Quat
@@ -105,7 +105,7 @@ def test_it_is_the_dense_filter_with_a_state_more() -> None:
     bias_w, bias_f = np.array([0.02, -0.03, 0.01]), np.array([0.1, -0.2, 0.15])
     made = Eskf()
     numbers = made.parameters(Context(VEHICLE, DT, MODEL))
-    assert isinstance(numbers.turning_noise, Vec3)
+    assert isinstance(numbers.turning, TurningNoise)
     assert isinstance(VEHICLE.air, Aerodynamics)
     memory: Any = None
     dense: Any = None
@@ -132,7 +132,7 @@ def test_it_is_the_dense_filter_with_a_state_more() -> None:
         if memory is None:
             memory = made.initial(inputs, numbers)
             memory = made.step(memory, inputs, numbers, DT)[0]
-            dense = Dense(at, fast, seen, gyro, felt, float(numbers.turning_noise.z))
+            dense = Dense(at, fast, seen, gyro, felt, float(numbers.turning.hover.z))
             continue
         memory, found, signals = made.step(memory, inputs, numbers, DT)
         dense.predict(gyro, felt, np.array([*VEHICLE.air.damping]))
@@ -159,7 +159,7 @@ def test_it_is_the_dense_filter_with_a_state_more() -> None:
 def test_noise_of_rates_is_a_share_of_the_torques_of_hover() -> None:
     """A newton of weight on four arms and four drag torques, by hand."""
     weight, x = VEHICLE.mass * VEHICLE.gravity, [abs(float(value)) for value in VEHICLE.rotor_x]
-    noise = noise_of_rates(VEHICLE, 0.1)
+    noise = turning_noise(VEHICLE, 0.1).hover
     lag = math.sqrt(2.0 / VEHICLE.rotor_bandwidth)
     assert noise.z == pytest.approx(0.1 * weight * VEHICLE.torque_ratio / VEHICLE.inertia.z * lag)
     assert noise.y == pytest.approx(0.1 * weight / 4 * sum(x) / VEHICLE.inertia.y * lag)

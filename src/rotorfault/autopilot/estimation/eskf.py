@@ -38,14 +38,15 @@ from rotorfault.autopilot.estimation.start import first_attitude, first_filter
 from rotorfault.autopilot.estimation.states import ERROR, FORCE_BIAS, GYRO_BIAS, P, States, V
 from rotorfault.autopilot.estimation.unread import (
     AT_END,
+    TurningNoise,
     Unread,
     all_read,
     carried_on,
     handed_over,
     kept,
-    noise_of_rates,
     not_read,
     rate_of,
+    turning_noise,
 )
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
@@ -83,7 +84,7 @@ class EskfParameters(NamedTuple):
     start_tilt: Scalar  # rad
     start_speed: Scalar  # m/s
     saturated: Scalar  # rad/s/sqrt(Hz)
-    turning_noise: Vec3 | tuple[()]  # rad/s^2/sqrt(Hz): of rates that are carried on; empty if none are
+    turning: TurningNoise | tuple[()]  # of rates that are carried on; empty if none are
 
 
 class EskfMemory(NamedTuple):
@@ -157,7 +158,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         sensors, s = context.sensors, self.settings
         if not isinstance(sensors, SensorModel):
             sensors = SensorModel()
-        turning = noise_of_rates(context.vehicle, s.unknown_torque) if self.asks_for_thrust else ()
+        turning = turning_noise(context.vehicle, s.unknown_torque) if self.asks_for_thrust else ()
         return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning)
 
     def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:
@@ -198,10 +199,12 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         running = greater(memory.count, 0.5)  # at the first instant no time has gone by, and all is read already
         spell = dt * running
         gyro = required(readings, "rates", "eskf")
-        rates, unread, moving = gyro.value - memory.gyro_bias, None, memory.unread
-        if isinstance(memory.unread, Unread):
+        rates, unread, moving, drift = gyro.value - memory.gyro_bias, None, memory.unread, None
+        if isinstance(memory.unread, Unread) and isinstance(parameters.turning, TurningNoise):
             at_end, unread = not_read(gyro, _noise(sensors.rates))
-            carried, moving = carried_on(memory.unread, memory.rates, inputs.believed_thrust, inputs.vehicle, spell)
+            thrust = inputs.believed_thrust
+            carried, slower, moving = carried_on(memory.unread, memory.rates, thrust, inputs.vehicle, spell)
+            drift = parameters.turning.drift(slower, dt)
             rates = rate_of(rates, carried, gyro.value, at_end, unread)
         force = required(readings, "specific_force", "eskf").value - memory.force_bias
         force = force - rates.cross(rates.cross(sensors.imu_at_B))
@@ -216,7 +219,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         moved = (memory.v_W + gained * 0.5) * spell
         p_W, v_W = memory.p_W + moved, memory.v_W + gained
         filter_ = Filter(memory.covariance, states.number)
-        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, gyro, unread)
+        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, gyro, unread, drift)
         timing = timing_of_fix(sensors)
         behind = moved_on(memory.behind, moved, gained, turn, timing, memory.count)
         belief = measurements.Belief(p_W, v_W, q_WB, R, rates, slow, memory.floor, gravity)
@@ -264,7 +267,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
     @staticmethod
     def _predict(
         filter_: Filter, memory: EskfMemory, parameters: EskfParameters, R: Mat3, force_W: Vec3, spell: Scalar,
-        running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None,
+        running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None, drift: Vec3 | None,
     ) -> tuple[Any, ...]:  # fmt: skip
         """The covariance a period later, and the slow errors."""
         sensors = parameters.sensors
@@ -283,18 +286,18 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         filter_.move({ERROR + i: {GYRO_BIAS + j: c for j, c in enumerate(rows[i])} for i in range(3)})
         # A reading that is held over several instants is off by the same in each.
         blur, walk = rates.std * rates.std * rates.timing.every * spell, rates.bias_walk * rates.bias_walk
-        if unread is None:
+        if unread is None or drift is None:
             x, y, z = (absolute(one) for one in gyro.value)
             beyond = greater(maximum(maximum(x, y), z), rates.limit * AT_END)
             blur = blur + beyond * parameters.saturated * parameters.saturated
             walks = Vec3(walk, walk, walk)
         else:
-            walks = Vec3.of(select(on, q * q, walk) for on, q in zip(unread, parameters.turning_noise, strict=True))
-        for i, drift in enumerate(walks):
+            walks = Vec3.of(select(on, made, walk) for on, made in zip(unread, drift, strict=True))
+        for i, walks_by in enumerate(walks):
             filter_.blur(V + i, force.std * force.std * force.timing.every * spell * spell)
             filter_.blur(ERROR + i, blur * spell)
             filter_.blur(FORCE_BIAS + i, force.bias_walk * force.bias_walk * spell)
-            filter_.blur(GYRO_BIAS + i, drift * spell)
+            filter_.blur(GYRO_BIAS + i, walks_by * spell)
         slow = []
         for group, value in zip(States.of(sensors).slow, memory.slow, strict=True):
             noise = group.noise

@@ -16,10 +16,10 @@ high, so nothing has to be done when an axis is lost but to add the noise of a r
 it was, and its variance is kept aside and grows by its walk. When the gyro reads again, the state is the bias again,
 with that variance, and independent of all others: of what had linked them most is gone by then.
 
-The noise of the rate is that of a torque which is wrong by `unknown_torque` of what the rotors give about an axis in
-hover, and that changes as fast as rotors do (bandwidth :math:`w_0`): a density of :math:`\alpha\sqrt{2/w_0}`, of an
-angular acceleration :math:`\alpha`. Left out: that an error of one such rate changes another by gyroscopic torques,
-and that the air damps it.
+The noise of the rate is that of an angular acceleration :math:`\alpha` that is wrong by the share `unknown_torque`,
+of what the rotors' torques give about an axis in hover and of what their change of momentum gives now; it lasts as
+long as rotors lag (bandwidth :math:`w_0`), which makes a density of :math:`\alpha\sqrt{2/w_0}`. Left out: that an
+error of one such rate changes another by gyroscopic torques, and that the air damps it.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 from rotorfault.autopilot.estimation.covariance import Filter
 from rotorfault.autopilot.estimation.states import GYRO_BIAS
+from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3, spread, zeros
 from rotorfault.maths.scalar import Scalar, absolute, greater, greater_equal, maximum, minimum, select, sqrt
 from rotorfault.model.mixer import hover_thrust
@@ -72,23 +73,46 @@ def all_read(bias: Scalar, thrust: PerRotor, vehicle: Vehicle) -> Unread:
     return Unread(zeros(), Vec3(variance, variance, variance), zeros(), against)
 
 
-def noise_of_rates(vehicle: Vehicle, share: Scalar) -> Vec3:
-    """Noise density of the believed angular acceleration in rad/s^2/sqrt(Hz), for each axis.
+class TurningNoise(NamedTuple):
+    """How wrong the believed angular acceleration may be: densities in units of 1/sqrt(Hz)."""
+
+    hover: Vec3  # rad/s^2/sqrt(Hz): of the torques that rotors give in hover, about each axis
+    share: Scalar  # 1/sqrt(Hz): of the angular acceleration by which the rotors' momentum changes
+
+    def __repr__(self) -> str:
+        return record_line(self)
+
+    def drift(self, slower: Vec3, dt: Scalar) -> Vec3:
+        """Variance in (rad/s)^2/s that a rate gains which is carried on.
+
+        Parameters
+        ----------
+        slower : Vec3, rad/s
+            By which the rotors' change of momentum has turned the body slower over the last period.
+        dt : scalar, s
+        """
+        change = self.share / dt
+        gained: Vec3 = self.hover.times(self.hover) + slower.times(slower) * (change * change)
+        return gained
+
+
+def turning_noise(vehicle: Vehicle, share: Scalar) -> TurningNoise:
+    """Noise of the believed angular acceleration.
 
     Parameters
     ----------
     vehicle : Vehicle
         As believed.
     share : scalar
-        Of the torques that the rotors give in hover: unknown.
+        Of torques and of changes of momentum: unknown.
     """
     hover = spread(hover_thrust(vehicle), vehicle.rotors)
     size = zeros()
     for i in range(vehicle.rotors):
         alone = PerRotor.of(thrust if i == k else 0.0 for k, thrust in enumerate(hover))
         size = size + over_inertia(vehicle, wrench_of(vehicle, alone).torque_B).map(absolute)
-    density: Vec3 = size * (share * sqrt(2.0 / mean_bandwidth(vehicle)))
-    return density
+    lasting = share * sqrt(2.0 / mean_bandwidth(vehicle))
+    return TurningNoise(size * lasting, lasting)
 
 
 def not_read(gyro: Reading[Vec3], noise: SensorNoise) -> tuple[Vec3, Vec3]:
@@ -105,8 +129,10 @@ def not_read(gyro: Reading[Vec3], noise: SensorNoise) -> tuple[Vec3, Vec3]:
     return at_end, at_end.map(lambda one: 1.0 - (1.0 - one) * gyro.valid)
 
 
-def carried_on(unread: Unread, rates: Vec3, thrust: PerRotor, vehicle: Vehicle, spell: Scalar) -> tuple[Vec3, Unread]:
-    """The rates in rad/s of the last instant a period later, by the believed motion, and what made them.
+def carried_on(
+    unread: Unread, rates: Vec3, thrust: PerRotor, vehicle: Vehicle, spell: Scalar
+) -> tuple[Vec3, Vec3, Unread]:
+    """Rates of the last instant a period later by the believed motion; what rotors took of them; for the next one.
 
     Parameters
     ----------
@@ -126,10 +152,10 @@ def carried_on(unread: Unread, rates: Vec3, thrust: PerRotor, vehicle: Vehicle, 
     residual = residual_speed(vehicle, speeds)
     turning = angular_acceleration(vehicle, torque, rates, residual)
     against = turn_against_rotors(vehicle, residual)
-    slower = against - unread.against
-    carried = rates + (turning * 1.5 - unread.turning * 0.5) * spell
-    carried = carried - (slower if isinstance(slower, Vec3) else Vec3(0.0, 0.0, slower))
-    return carried, unread._replace(turning=turning, against=against)
+    gap = against - unread.against
+    slower = gap if isinstance(gap, Vec3) else Vec3(0.0, 0.0, gap)
+    carried = rates + (turning * 1.5 - unread.turning * 0.5) * spell - slower
+    return carried, slower, unread._replace(turning=turning, against=against)
 
 
 def rate_of(read: Vec3, carried: Vec3, gyro: Vec3, at_end: Vec3, axes: Vec3) -> Vec3:
