@@ -1,15 +1,17 @@
 """What real sensing costs: the paper's three cases, faults of sensors, and the spin after a total loss.
 
-    python benchmarks/real_sensing.py [--flights 50] [--only paper faults spin known] [--tracking so3] [--json FILE]
+    python benchmarks/real_sensing.py [--flights 50] [--only paper faults after spin known] [--tracking so3]
+        [--json FILE]
 
 *paper*: the three cases of the paper (set point, sinusoid, square) with each set of sensors, the plant being
 `rigid_body`: the paper's model takes Euler rates for body rates, which no gyro measures. Flights that survive, error
 of position after 2 s (root mean square, median flight), cost J (median). Attitude is tracked as the paper does it,
 `euler`, or with `--tracking so3` by rotations.
 
-*faults*: hover of a Hummingbird in gusts of 5 m/s, with a set of sensors and a fault of one: the gyro's bias jumps
-by 5 deg/s about x, satellites or cameras are silent for 5 s, the magnetometer freezes. Survived, and the largest
-distance from the reference.
+*faults*: hover of a Hummingbird in gusts of 5 m/s, with a set of sensors and every kind of fault of each, while the
+observer looks for faults of rotors. Survived, and the largest distance from the reference.
+
+*after*: the same vehicle after faults of rotors. Both parts by each estimator.
 
 *spin*: rotor 1 stops at 1 s, in wind of 5 m/s with gusts, by relaxed hover; the fastest yaw rate there was in flights
 that survive beside the end of the gyro's range, 34.9 rad/s; also with `beyond_range = "hold"` of the filter.
@@ -43,15 +45,37 @@ Array = NDArray[np.float64]
 RECORDED = 0.005  # s between two records of a spin
 CASES = ("paper-set-point", "paper-sinusoid", "paper-square")
 SETS = ("ideal", "noisy", "mocap", "gps-consumer", "crazyflie")
-JUMP = {"kind": "sensor_bias", "sensor": "gyro", "time": 3.0, "bias": [0.0873, 0.0, 0.0]}
-SILENT = {"kind": "sensor_dropout", "sensor": "position", "start": 3.0, "end": 8.0}
-FROZEN = {"kind": "sensor_freeze", "sensor": "magnetometer", "start": 3.0, "end": 8.0}
+BOTH, GPS = ("mocap", "gps-consumer"), ("gps-consumer",)
+SPELL = {"start": 3.0, "end": 8.0}
 FAULTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "none": ({}, ("mocap", "gps-consumer")),
-    "gyro jumps 5 deg/s": (JUMP, ("mocap", "gps-consumer")),
-    "position silent 5 s": (SILENT, ("mocap", "gps-consumer")),
-    "magnetometer frozen 5 s": (FROZEN, ("gps-consumer",)),
+    "none": ({}, BOTH),
+    "gyro jumps 5 deg/s": ({"kind": "sensor_bias", "sensor": "gyro", "bias": [0.0873, 0.0, 0.0]}, BOTH),
+    "gyro silent 0.2 s": ({"kind": "sensor_dropout", "sensor": "gyro", "start": 3.0, "end": 3.2}, BOTH),
+    "gyro silent 1 s": ({"kind": "sensor_dropout", "sensor": "gyro", "start": 3.0, "end": 4.0}, BOTH),
+    "gyro silent 5 s": ({"kind": "sensor_dropout", "sensor": "gyro", **SPELL}, BOTH),
+    "gyro frozen 0.2 s": ({"kind": "sensor_freeze", "sensor": "gyro", "start": 3.0, "end": 3.2}, BOTH),
+    "gyro frozen 1 s": ({"kind": "sensor_freeze", "sensor": "gyro", "start": 3.0, "end": 4.0}, BOTH),
+    "accelerometer jumps 0.5 m/s^2": ({"kind": "sensor_bias", "sensor": "accelerometer", "bias": [0.5, 0, 0]}, BOTH),
+    "accelerometer silent 5 s": ({"kind": "sensor_dropout", "sensor": "accelerometer", **SPELL}, BOTH),
+    "accelerometer frozen 5 s": ({"kind": "sensor_freeze", "sensor": "accelerometer", **SPELL}, BOTH),
+    "position jumps 2 m": ({"kind": "sensor_bias", "sensor": "position", "bias": [2.0, 0.0, 0.0]}, BOTH),
+    "position silent 5 s": ({"kind": "sensor_dropout", "sensor": "position", **SPELL}, BOTH),
+    "position frozen 5 s": ({"kind": "sensor_freeze", "sensor": "position", **SPELL}, BOTH),
+    "magnetometer jumps 5 uT": ({"kind": "sensor_bias", "sensor": "magnetometer", "bias": [0.0, 5e-6, 0.0]}, GPS),
+    "magnetometer silent 5 s": ({"kind": "sensor_dropout", "sensor": "magnetometer", **SPELL}, GPS),
+    "magnetometer frozen 5 s": ({"kind": "sensor_freeze", "sensor": "magnetometer", **SPELL}, GPS),
+    "barometer jumps 2 m": ({"kind": "sensor_bias", "sensor": "barometer", "bias": [2.0, 0.0, 0.0]}, GPS),
+    "barometer silent 5 s": ({"kind": "sensor_dropout", "sensor": "barometer", **SPELL}, GPS),
+    "barometer frozen 5 s": ({"kind": "sensor_freeze", "sensor": "barometer", **SPELL}, GPS),
 }
+"""Every kind of fault of every sensor; jumps at 3 s."""
+ESTIMATORS = ("eskf", "complementary")
+AFTER = {
+    "25 % of rotor 1": {"kind": "step", "rotor": 1, "time": 3.0, "loss": 0.25},
+    "45 % of rotor 1": {"kind": "step", "rotor": 1, "time": 3.0, "loss": 0.45},
+    "all of rotor 3": {"kind": "total", "rotor": 3, "time": 3.0},
+}
+"""Faults of rotors after which an estimator flies on."""
 SPINNERS = {("mueller-2014", "hummingbird"): (0.125, 0.25, 0.5, 1.0, 2.0), ("hummingbird", "hummingbird"): (1.0,)}
 """Vehicles with a preset, and by what the air's brake on the spin is multiplied."""
 HELD = {"kind": "eskf", "beyond_range": "hold"}
@@ -112,18 +136,36 @@ def paper(flights: int, tracking: str = "euler") -> dict[str, Any]:
     }
 
 
+COMMON = {
+    "vehicle": "hummingbird", "controller.preset": "hummingbird", "duration": 15.0,
+    "wind": {"kind": "dryden", "wind_at_6m": 5.0, "velocity_W": [3.0, 2.0, 0.0]},
+}  # fmt: skip
+
+
 def faults(flights: int) -> dict[str, Any]:
     """Faults of sensors."""
-    common = {
-        "vehicle": "hummingbird", "controller.preset": "hummingbird", "duration": 15.0, "diagnosis": "off",
-        "wind": {"kind": "dryden", "wind_at_6m": 5.0, "velocity_W": [3.0, 2.0, 0.0]},
-    }  # fmt: skip
+    found = {}
+    for name, (fault, sets) in FAULTS.items():
+        hit = [({} if "start" in fault else {"time": 3.0}) | fault] if fault else []
+        for sensors, estimator in itertools.product(sets, ESTIMATORS):
+            settings = COMMON | {"sensors": sensors, "estimator": estimator, "fault": hit}
+            found[f"{name}, {sensors}, {estimator}"] = flown("hover-fault", settings, flights)
+    return found
+
+
+def after(flights: int) -> dict[str, Any]:
+    """Faults of rotors, with each estimator in the loop."""
+    drag = {"value": 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}
     return {
-        f"{name}, {sensors}": flown(
-            "hover-fault", {**common, "sensors": sensors, "fault": [fault] if fault else []}, flights
+        f"{name}, {sensors}, {estimator}": flown(
+            "hover-fault",
+            COMMON
+            | {"sensors": sensors, "estimator": estimator, "fault": [fault], "vehicle.air.rotor_drag": drag}
+            | {"start.position": [0.0, 0.0, 10.0], "reference.position": [0.0, 0.0, 10.0]},
+            flights,
         )
-        for name, (fault, sets) in FAULTS.items()
-        for sensors in sets
+        for name, fault in AFTER.items()
+        for sensors, estimator in itertools.product(BOTH, ESTIMATORS)
     }
 
 
@@ -196,7 +238,9 @@ def waves(place: Array, carrier: Array) -> Array:
     return size
 
 
-PARTS: dict[str, Callable[..., dict[str, Any]]] = {"paper": paper, "faults": faults, "spin": spin, "known": known}
+PARTS: dict[str, Callable[..., dict[str, Any]]] = {
+    "paper": paper, "faults": faults, "after": after, "spin": spin, "known": known,
+}  # fmt: skip
 
 
 def main() -> None:
