@@ -134,17 +134,22 @@ def _column(data: FlightData, curve: Curve) -> Array:
 
 
 def _motion(data: FlightData) -> Iterator[Panel]:
-    known = "logged" if "logged" in data.attrs else "true"
+    if "logged" in data.attrs:
+        # Nothing stands beside what was logged: all axes in a plot, so that a phone has little to scroll.
+        for signal, names, unit in (("position", AXES, "m"), ("attitude", ANGLES, "rad")):
+            curves = _curves(data, *(Curve(signal, k, name, MORE) for k, name in enumerate(names)))
+            yield Panel(f"{signal}.logged", "Motion", f"{signal}, logged", unit, curves)
+        return
     for k, axis in enumerate(AXES):
         curves = (
-            Curve("position", k, known, TRUE),
+            Curve("position", k, "true", TRUE),
             Curve("position_estimated", k, "estimated", BELIEVED),
             Curve("position_reference", k, "desired", ASKED),
         )
         yield Panel(f"position.{axis}", "Motion", f"position {axis}", "m", _curves(data, *curves))
     for k, angle in enumerate(ANGLES):
         curves = (
-            Curve("attitude", k, known, TRUE),
+            Curve("attitude", k, "true", TRUE),
             Curve("attitude_estimated", k, "estimated", BELIEVED),
             Curve("controller.attitude_command", k, "command of the position loop", ASKED),
         )
