@@ -156,7 +156,7 @@ def test_twins_are_seen_under_other_names() -> None:
         (r"h5py\.File\([^)]*\"w\"|to_netcdf\(", {"results/netcdf.py"}),
         (r"^from llvmlite|^import llvmlite", {"engine/native.py"}),
         (r"multiprocessing|ProcessPoolExecutor", {"base/executors.py"}),
-        (r"SeedSequence|default_rng|Philox\(", {"campaigns/flight_set.py", "scenario/neighbours.py",
+        (r"SeedSequence|default_rng|Philox\(", {"campaigns/flight_set.py", "scenario/neighbours.py", "analysis/isolation.py",
                                                 "tuning/training.py", "bench/sdre.py", "bench/flights.py",
                                                     "bench/rotorpy_plant.py"}),
     ],

@@ -75,7 +75,11 @@ def stationary(steps: int, flights: int, loss: float, at: int, seed: int) -> tup
         seen = innovation(belief, {0: 1.0}, rate + rng.normal(size=flights) * math.sqrt(r), r)
         belief = follow(belief, seen)
         step = Step(
-            rows, ((-effect * dt,),), (0.0,), (({0: 1.0}, seen), ({2: 0.0}, innovation(belief, {2: 0.0}, none, 1.0)))
+            rows,
+            ((-effect * dt,),),
+            (0.0,),
+            (({0: 1.0}, seen), ({2: 0.0}, innovation(belief, {2: 0.0}, none, 1.0))),
+            {0: q * dt},
         )
         windows = jumps.watch(windows, length, step, dt)
         found = jumps.best(windows, 0.0)

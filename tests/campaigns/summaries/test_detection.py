@@ -190,6 +190,34 @@ def test_a_loss_cannot_come_and_go_without_a_rotor() -> None:
         columns({"loss": np.array([0.2]), "flicker": np.array([0.5]), "onset": np.array([1.0])})
 
 
+@needs_simd
+def test_isolation_of_a_detector_that_is_foreseen_is_its_own(flown: Path) -> None:
+    """The same table read as if `glr` had flown: predicted shares follow its windows, what was measured stays."""
+    table = pl.read_parquet(flown / "flights.parquet").to_arrow()
+    variants = [{"label": label, "settings": {"diagnosis": "glr"}} for label in ("as it is", "eager")]
+    rows = detection(study_from(DETECTION | {"variant": variants}, "study"), table).files["detection.json"][
+        "isolation"
+    ]
+    assert [row["measured"] for row in rows] == [row["measured"] for row in content_of(flown)["isolation"]]
+    for row in rows:
+        mine = pl.from_arrow(table).filter(pl.col("variant") == "as it is", pl.col("struck") == row["rotor"])  # type: ignore[union-attr]
+        large = mine.filter(pl.col("loss") == 0.4).height / mine.height
+        # A loss of 0.4 is always named; one of 0.06 seldom.
+        assert large - 1e-9 <= row["predicted"][row["rotor"]] <= large + 0.5 * (1.0 - large)
+        assert 1.0 <= row["predicted_among"] < 1.5
+
+
+def test_frames_of_all_numbers_of_rotors_are_flown() -> None:
+    study = load_study("detection-frames")
+    first = {axis.name: axis.case[0] for axis in study.case_axes}
+    vehicles = next(axis.case for axis in study.case_axes if axis.name == "vehicle")
+    scenarios = [study.scenario_of(0, tuple({**first, "vehicle": one}.values())) for one in vehicles]
+    assert {len(one.vehicle.rotor) for one in scenarios} == {4, 6, 8}
+    assert {one.estimator.kind for one in scenarios} == {"eskf"}
+    places = [{(rotor.x.value, rotor.y.value) for rotor in one.vehicle.rotor} for one in scenarios]
+    assert sum(len(some) < len(one.vehicle.rotor) for some, one in zip(places, scenarios, strict=True)) == 2
+
+
 @pytest.mark.parametrize("name", ["detection", "detection-rate"])
 def test_all_vehicles_meet_all_manoeuvres_with_real_sensors(name: str) -> None:
     study = load_study(name)

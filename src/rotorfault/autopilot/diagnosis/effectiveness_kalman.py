@@ -91,8 +91,9 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         still = verdict.still_faulty(mean, variance, p.least)
         flags, _ = verdict.held(flags, new, still, p.clear_persistence, dt)
 
+        among = verdict.fewest(fresh).map(maximum, flags.flagged)
         estimate = mean.map(lambda x: clip(x, 0.0, 1.0))
         probability = flags.flagged.map(lambda on, a, b: on * a + (1.0 - on) * b, still, fresh)
         residual = -(estimate * inputs.expectation.thrust)
         diagnosis = Diagnosis(estimate * flags.flagged, flags.flagged, estimate, residual, probability=probability)
-        return EffectivenessMemory(model, flags), diagnosis, GlrSignals(probability, excess, p.threshold)
+        return EffectivenessMemory(model, flags), diagnosis, GlrSignals(probability, excess, among, p.threshold)

@@ -118,6 +118,7 @@ class Step(NamedTuple):
     torque: tuple[tuple[Scalar, ...], ...]  # rad/s: by which a whole loss of each rotor changes the rates
     force: tuple[Scalar, ...]  # m/s^2: by which it changes the specific force
     seen: tuple[tuple[Sparse, Innovation], ...]  # rates about x, y, z, and specific force along them, in this order
+    noise: Sparse  # variances that were added to the state
 
 
 def model_parameters(settings: ModelSettings, context: Context) -> ModelParameters:
@@ -318,7 +319,7 @@ def advance(
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
     seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
     after = ModelMemory(belief, lagged, speed, lag, reacting, *seen_noise, touched)
-    return after, Step(rows, torque, force, tuple(seen))
+    return after, Step(rows, torque, force, tuple(seen), noise)
 
 
 def within_bounds(belief: Belief) -> Belief:

@@ -66,6 +66,7 @@ class GlrSignals(NamedTuple):
 
     probability: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a rotor is at fault")]
     statistic: Annotated[PerRotor, Q("1", NO_FRAME, "standard deviations by which its loss stands out")]
+    among: Annotated[PerRotor, Q("1", NO_FRAME, "1 for the fewest rotors of which one is surely at fault")]
     level: Annotated[Scalar, Q("1", NO_FRAME, "standard deviations at which one rotor alone is flagged")]
 
 
@@ -159,7 +160,8 @@ def found_and_followed(
     windows = jumps.begun_anew(windows, 1.0 - new.sum())
     flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
     after = GlrMemory(model._replace(belief=belief), windows, flags)
-    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, p.threshold)
+    among = verdict.fewest(fresh).map(maximum, flags.flagged)
+    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, p.threshold)
 
 
 def conclude(

@@ -13,6 +13,8 @@ A flagged rotor's loss is a state of the filter, :math:`\hat\lambda_i` with the 
 is that it has lost more than ``least``, :math:`\Phi\big((\hat\lambda_i - least)/\sqrt{P_i}\big)`, with a logistic
 curve for :math:`\Phi` (within 0.01). The flag is taken back where that has stayed below `CLEAR` for
 ``clear_persistence``.
+While it is sure that a rotor is at fault and not which, the fewest rotors that have it with :math:`p_1` together are
+named instead (`fewest`).
 Between the two levels nothing changes, so nothing chatters.
 """
 
@@ -57,9 +59,13 @@ def probabilities(evidence: PerRotor, level: Scalar, flagged: PerRotor) -> PerRo
     flagged : PerRotor
         1 where a fault is believed already, which is none of a new one.
     """
-    known = evidence.map(lambda x, on: select(on, -MOST, minimum(x - level, MOST)), flagged)
-    shares = known.map(lambda x: exp(maximum(x, -MOST)))
-    over = 1.0 / (shares.sum() + math.exp(PRIOR_ODDS))
+    known = evidence.map(lambda x, on: select(on, -MOST, x - level), flagged)
+    # Beside the most that is said for anything: where much is said for two rotors, it is the difference that counts.
+    most: Scalar = PRIOR_ODDS
+    for x in known:
+        most = maximum(most, x)
+    shares = known.map(lambda x: exp(maximum(x - most, -MOST)))
+    over = 1.0 / (shares.sum() + exp(maximum(PRIOR_ODDS - most, -MOST)))
     return shares.map(lambda x, on: select(on, 0.0, x * over), flagged)
 
 
@@ -82,6 +88,27 @@ def newly(
     # Times are compared with half a period to spare, so that rounding of the sums cannot cost a period.
     new = above.map(lambda t: both(less(0.0, t), greater_equal(t, persistence - 0.5 * dt)))
     return memory._replace(above=above), new
+
+
+def fewest(probability: PerRotor) -> PerRotor:
+    """1 for the fewest rotors that have a fault with `RAISE` of probability together; for none while none is sure.
+
+    Of two rotors on an arm one has it long before it is known which: "rotor 1 or 6".
+
+    Parameters
+    ----------
+    probability : PerRotor
+        Of a new fault of each.
+    """
+    sure = greater_equal(probability.sum(), RAISE)
+
+    def one(p: Scalar) -> Scalar:
+        before: Scalar = 0.0
+        for other in probability:
+            before = before + select(less(p, other), other, 0.0)
+        return both(sure, both(less(before, RAISE), less(0.0, p)))
+
+    return probability.map(one)
 
 
 def still_faulty(mean: PerRotor, variance: PerRotor, least: Scalar) -> PerRotor:

@@ -19,7 +19,8 @@ from scipy.special import gammaincinv
 
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.campaigns.study import Study
-from rotorfault.campaigns.summaries.detection_figures import figures, isolation, tables
+from rotorfault.campaigns.summaries.detection_figures import figures, tables
+from rotorfault.campaigns.summaries.isolation import isolation
 from rotorfault.campaigns.summaries.parts import (
     NAMED,
     Column,
@@ -36,6 +37,7 @@ from rotorfault.campaigns.summaries.parts import (
     sensors_of,
     told,
 )
+from rotorfault.scenario.scenario import Scenario
 
 BANDS = 3  # of gusts and vibration, alike in width
 WITHIN = (45, 130, 300, 2000)  # ms: delays by which flights are counted
@@ -98,6 +100,7 @@ def _flights(study: Study, columns: Mapping[str, Column]) -> Flights:
     count = len(columns["cell"])
     kinds: list[Kind | None] = [None] * count
     vehicles = {}
+    scenarios: dict[int, Scenario] = {}
     for one in told(study, columns):
         vehicles[one.vehicle] = one.scenario.vehicle
         kind = Kind(
@@ -107,13 +110,16 @@ def _flights(study: Study, columns: Mapping[str, Column]) -> Flights:
         )  # fmt: skip
         for k in one.which:
             kinds[k] = kind
+            scenarios[int(k)] = one.scenario
     loss = columns["loss"].astype(float) if "loss" in columns else np.ones(count)
     # What is drawn in cases of faults alone has no number in healthy ones.
     loss = np.nan_to_num(loss)
     if "loss" in columns:
         pairs = zip(kinds, loss, strict=True)
         kinds = [kind and kind._replace(fault=kind.fault or f"{share:g}") for kind, share in pairs]
-    return Flights([kind for kind in kinds if kind is not None], columns, loss, study.refine.level, vehicles)
+    return Flights(
+        [kind for kind in kinds if kind is not None], columns, loss, study.refine.level, vehicles, scenarios
+    )
 
 
 def _rows(flights: Flights, names: Sequence[str], numbers: Callable[[Which], Row], *, faulty: bool) -> list[Row]:

@@ -1,8 +1,4 @@
-"""Tables and figures of a campaign that judges detectors, and what its isolation of rotors was predicted to be.
-
-Predicted is what `rotorfault.analysis.signatures.told_apart` says of hover, for the observer and the noise of the
-sensors ``noisy``: a rotor is named for the losses from which it is told apart 99 times in 100, and none below.
-"""
+"""Tables and figures of a campaign that judges detectors."""
 
 from __future__ import annotations
 
@@ -10,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from rotorfault.analysis.signatures import told_apart
 from rotorfault.campaigns.summaries.parts import (
     NAMED,
     Column,
@@ -30,44 +25,6 @@ from rotorfault.campaigns.summaries.parts import (
 DELAYS = (8, 16, 32, 45, 64, 90, 130, 180, 300, 500, 1000, 2000)  # ms: points of the delays' distribution
 NO_ROTOR = "none"
 AFTER = 0.1  # s: a rotor that is named by then has a loss that is estimated when it is read
-
-
-def isolation(flights: Flights, variant: str) -> list[Row]:
-    """For each rotor of each vehicle, what it was predicted to be taken for, and what it was taken for.
-
-    Parameters
-    ----------
-    flights : Flights
-    variant : str
-        Label of the detector whose flights are counted.
-
-    Returns
-    -------
-    list of dict
-        ``vehicle``, ``rotor``, ``most_alike`` (rotor), ``angle`` [rad], ``least_loss`` from which it is predicted to
-        be told apart; ``predicted`` and ``measured``: shares of its faults for which none, rotor 1, rotor 2 and so on
-        were to be named and were; ``flights``.
-    """
-    found = []
-    for (vehicle, rotors), which in flights.some("vehicle", "rotors").items():
-        mine = np.array([flights.kind[k].variant == variant for k in which]) & (flights.loss[which] > 0.0)
-        struck, first = (flights.columns[name][which][mine].astype(int) for name in ("struck", "flagged_first"))
-        loss = flights.loss[which][mine]
-        for told in told_apart(flights.vehicles[vehicle]).singles:
-            own = struck == told.rotor
-            if own.any():
-                named = np.where(loss[own] >= told.least_loss, told.rotor, 0)
-                found.append(
-                    {"vehicle": vehicle, "rotor": told.rotor, "most_alike": told.like, "angle": told.angle,
-                     "least_loss": told.least_loss if np.isfinite(told.least_loss) else None,
-                     "predicted": _counts(named, rotors), "measured": _counts(first[own], rotors),
-                     "flights": int(own.sum())}
-                )  # fmt: skip
-    return found
-
-
-def _counts(named: Column, rotors: int) -> list[float]:
-    return [float(share) for share in np.bincount(named, minlength=rotors + 1) / max(len(named), 1)]
 
 
 def tables(content: Row) -> tuple[PageTable, ...]:
@@ -172,12 +129,17 @@ def _isolation_table(rows: list[Row]) -> PageTable:
 
     return PageTable(
         "Which rotor for which",
-        "Predicted from the model, in hover and without wind, for the observer (rf.told_apart): the rotor whose loss "
-        "looks most alike, the angle between both, and the loss from which both are told apart.",
-        ("vehicle", "rotor", "most alike", "angle", "told apart from", "named right", "most often wrong", "flights"),
+        "Sudden losses. Predicted for hover, from signatures, the filter's information and noise: the share named "
+        "right, and how many rotors may have the fault when it is sure that one has. Beside them the rotor whose "
+        "loss looks most alike, the angle between both, and the loss from which the observer tells them apart.",
+        ("vehicle", "sensors", "rotor", "most alike", "angle", "observer from", "right, predicted", "measured",
+         "may have it", "most often wrong", "flights"),
         tuple(
-            (row["vehicle"], str(row["rotor"]), str(row["most_alike"]), f"{np.degrees(row['angle']):.0f}°",
-             least(row), f"{100 * row['measured'][row['rotor']]:.1f} %", worst(row), str(row["flights"]))
+            (row["vehicle"], row["sensors"], str(row["rotor"]), str(row["most_alike"]),
+             f"{np.degrees(row['angle']):.0f}°", least(row), f"{100 * row['predicted'][row['rotor']]:.1f} %",
+             f"{100 * row['measured'][row['rotor']]:.1f} %",
+             "–" if row["predicted_among"] is None else f"{row['predicted_among']:.1f}", worst(row),
+             str(row["flights"]))
             for row in rows
         ),
     )  # fmt: skip
@@ -233,15 +195,16 @@ def _errors(flights: Flights, chosen: Which) -> list[Curves]:
 
 
 def _confusions(rows: list[Row], flights: Flights, of_first: Column) -> list[Shares]:
-    """Rotor at fault over rotor that is named, predicted beside measured, a figure for each vehicle."""
+    """Rotor at fault over rotor that is named, predicted beside measured, for each vehicle and set of sensors."""
     first = next((one.variant for one, mine in zip(flights.kind, of_first, strict=True) if mine), "")
     figures = []
-    for (vehicle,), which in grouped([(row["vehicle"],) for row in rows]).items():
+    for (vehicle, sensors), which in grouped([(row["vehicle"], row["sensors"]) for row in rows]).items():
         mine = [rows[k] for k in which]
         share = np.array([[row[name] for row in mine] for name in ("predicted", "measured")])
         names = (NO_ROTOR, *(str(k) for k in range(1, share.shape[2])))
         figures.append(
-            Shares(f"confusion-{vehicle}", f"{vehicle}: rotor at fault (rows) by the one that is named",
+            Shares(f"confusion-{vehicle}-{sensors}",
+                   f"{vehicle}, {sensors}: rotor at fault (rows) by the one that is named",
                    ("predicted in hover", f"measured, {first}"), tuple(str(row["rotor"]) for row in mine), names,
                    "rotor named", share)
         )  # fmt: skip

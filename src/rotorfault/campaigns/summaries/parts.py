@@ -90,6 +90,7 @@ class Flights(NamedTuple):
     loss: Column  # 0 in healthy flights
     level: float
     vehicles: Mapping[str, VehicleFile]
+    scenarios: Mapping[int, Scenario]  # of each flight, before anything is drawn
 
     def some(self, *names: str) -> dict[Any, Which]:
         """Flights by some of what is said of them."""
