@@ -1,12 +1,13 @@
 """Does diagnosis cost flights that survive without it? Healthy vehicles with a wrong model, and stuck rotors.
 
     python benchmarks/worse_than_none.py [--flights 100] [--duration 60] [--only healthy|stuck]
+        [--detector luenberger]
 
 ``healthy``: no fault; true moments of inertia (each of its own, as far as a body can have them) 0.8 to 1.2 and rotor
 bandwidth 0.7 to 1.4 times the believed, noisy sensors, gusts of 8 m/s at 6 m, 4 m squares and waypoints. Every flight
-twice, with the same numbers, gusts and noise: with the Luenberger observer and with diagnosis off. Per vehicle and
-controller: alarms per flight hour (all of them false) with the 95 % interval of a Poisson count, and how many flights
-are lost with, without, and with alone.
+twice, with the same numbers, gusts and noise: with a detector (the Luenberger observer unless another is named) and
+with diagnosis off. Per vehicle and controller: alarms per flight hour (all of them false) with the 95 % interval of a
+Poisson count, and how many flights are lost with, without, and with alone.
 
 ``stuck``: rotor 2 sticks in hover at a share of its hover thrust, in gusts of 5 m/s, 5 s long; which rotors are
 flagged, when, and how many flights are lost.
@@ -49,11 +50,13 @@ def waypoints(duration: float) -> dict[str, Any]:
     }
 
 
-def both(tables: Mapping[str, Any], vary: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, Array]]:
+def both(
+    tables: Mapping[str, Any], vary: Mapping[str, Any], detector: str
+) -> tuple[dict[str, Array], dict[str, Array]]:
     """Scores of the same flights with diagnosis and without."""
     with_it, without = (
         rf.fly_many(scenario_from({"period": 0.001, "sensors": "noisy", **tables, "diagnosis": kind}, "script"), vary)
-        for kind in ("luenberger", "off")
+        for kind in (detector, "off")
     )
     return with_it.table, without.table
 
@@ -83,7 +86,7 @@ def bodies(vary: dict[str, Array], vehicle: str) -> dict[str, Array]:
     return dict(zip(vary, moments / J[:, None], strict=True))
 
 
-def healthy(flights: int, duration: float) -> None:
+def healthy(flights: int, duration: float, detector: str) -> None:
     """Print a row for each vehicle, controller and path."""
     row("vehicle", "law", "path", "alarms/h", "95 %", "lost with", "without", "only with")
     for vehicle, preset in VEHICLES.items():
@@ -103,12 +106,12 @@ def healthy(flights: int, duration: float) -> None:
                     "mismatch": {"inertia": [1.0, 1.0, 1.0], "rotor_bandwidth": 1.0},
                     "start": {"position": [SIDE / 2, SIDE / 2, 0.5] if name == "square" else CORNERS[0]},
                 }
-                one, other = both(tables, vary)
+                one, other = both(tables, vary, detector)
                 alarms, hours = int(one["false_alarms"].sum()), float(one["end_time"].sum()) / 3600.0
                 row(vehicle, law, name, f"{alarms / hours:.1f}", interval(alarms, hours), *lost(one, other))
 
 
-def stuck(flights: int) -> None:
+def stuck(flights: int, detector: str) -> None:
     """Print a row for each vehicle, controller and share of hover thrust."""
     row("vehicle", "law", "thrust", "found", "delay [ms]", "others flagged", "lost with", "without", "only with")
     for vehicle, preset in VEHICLES.items():
@@ -126,7 +129,7 @@ def stuck(flights: int) -> None:
                     "fault": [{"kind": "stuck", "rotor": 2, "time": 1.0, "thrust": thrust}],
                 }
                 vary = {"seed": np.arange(flights), "fault.0.time": np.linspace(1.0, 1.3, flights)}
-                one, other = both(tables, vary)
+                one, other = both(tables, vary, detector)
                 delay = one["detected.2"] - one["onset.2"]
                 found = np.isfinite(delay) & (delay >= 0.0)
                 median = f"{1e3 * np.median(delay[found]):.0f}" if found.any() else "-"
@@ -138,12 +141,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=100, help="of each row")
     parser.add_argument("--duration", type=float, default=60.0, help="of healthy flights [s]")
+    parser.add_argument("--detector", default="luenberger", help="beside no diagnosis")
     parser.add_argument("--only", choices=("healthy", "stuck"))
     chosen = parser.parse_args()
     if chosen.only != "stuck":
-        healthy(chosen.flights, chosen.duration)
+        healthy(chosen.flights, chosen.duration, chosen.detector)
     if chosen.only != "healthy":
-        stuck(chosen.flights)
+        stuck(chosen.flights, chosen.detector)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple, final
 
 from rotorfault.autopilot.allocation.accounting import account, direct
 from rotorfault.autopilot.control.protocol import ControlOutput
-from rotorfault.autopilot.diagnosis.protocol import Oracle
+from rotorfault.autopilot.diagnosis.borne_out import Borne, acted_on, nothing_claimed
+from rotorfault.autopilot.diagnosis.protocol import Diagnoser, Oracle
 from rotorfault.autopilot.instant import Decision, Instant, Past
 from rotorfault.autopilot.rotor_model import expected_thrust, follow, rotors_at_hover
 from rotorfault.maths.geometry import PerRotor, per_rotor, zeros
@@ -34,6 +35,7 @@ class AutopilotMemory(NamedTuple):
 
     past: Past
     parts: Any  # record of the parts' memories, by slot
+    borne: Borne | tuple[()] = ()  # of a diagnosis that does not look; empty with one that does
 
 
 class AutopilotReport(NamedTuple):
@@ -70,6 +72,12 @@ class Autopilot:
     def asked(self) -> bool:
         """Whether a part asks what thrust the rotors are believed to have given."""
         return any(getattr(part, "asks_for_thrust", False) for part in self.parts.values())
+
+    @property
+    def _told(self) -> bool:
+        """Whether the diagnosis is found nowhere in the motion, and is not the truth either."""
+        diagnoser = next((part for slot, part in self.parts.items() if slot.name == "diagnosis"), None)
+        return isinstance(diagnoser, Diagnoser) and not diagnoser.looks and not isinstance(diagnoser, Oracle)
 
     def initial(
         self, readings: Readings, reference: Reference, vehicle: Vehicle, parameters: Any, dt: Scalar
@@ -112,7 +120,7 @@ class Autopilot:
             if slot.name == "estimator":
                 instant.outputs[slot.name] = part.step(memories[-1], inputs, numbers, dt)[1]
         past = past._replace(previous=motion_of(instant.estimate, vehicle.tilt != ()))
-        return AutopilotMemory(past, self._record(*memories))
+        return AutopilotMemory(past, self._record(*memories), nothing_claimed() if self._told else ())
 
     def step(
         self,
@@ -145,6 +153,7 @@ class Autopilot:
         memories: list[Any] = []
         telemetry: dict[str, Record] = {}
         wrench: Wrench | None = None
+        borne = memory.borne
         output: Any
         for slot, part in self.parts.items():
             before, numbers = getattr(memory.parts, slot.name), getattr(parameters, slot.name)
@@ -158,6 +167,8 @@ class Autopilot:
             else:
                 after, output, signals = part.step(before, _inputs(slot, instant), numbers, dt)
             memories.append(after)
+            if slot.name == "diagnosis" and isinstance(borne, Borne):
+                borne, output = acted_on(borne, output, instant.expectation, vehicle)
             instant.outputs[slot.name] = output
             telemetry[slot.name] = signals
         if wrench is None:
@@ -176,7 +187,7 @@ class Autopilot:
             believed=believed.stuck.thrust_of(rotors.mean, believed.loss) if self.asked else (),
         )
         report = AutopilotReport(instant, wrench, allocation, telemetry)
-        return AutopilotMemory(past, self._record(*memories)), command, report
+        return AutopilotMemory(past, self._record(*memories), borne), command, report
 
     @staticmethod
     def _relieved(instant: Instant, wrench: Wrench) -> Allocation:

@@ -80,14 +80,3 @@ def test_vibration_raises_no_alarm() -> None:
     tables = {**TABLES, "fault": [], "diagnosis": "multiple_model", "sensors": {"kind": "crazyflie", "imu": imu}}
     flights = rf.fly_many(scenario_from({**tables, "duration": 4.0}, "test"), {"seed": range(8)}, warn=False)
     assert not flights.table["false_alarms"].any()
-
-
-def test_a_made_up_belief_is_acted_on_while_it_lasts() -> None:
-    made_up = {"kind": "injected", "rotor": 3, "loss": 0.25, "time": 0.1, "end": 0.2}
-    simple = {"sensors": "noisy", "estimator": "direct", "mismatch": {}}
-    tables = {**TABLES, **simple, "fault": [], "duration": 0.3, "diagnosis": made_up}
-    flight = rf.fly(scenario_from(tables, "test"), engine="python")
-    believed = flight.data["loss_believed"].values
-    assert believed[150].tolist() == [0.0, 0.0, 0.25, 0.0]
-    assert not believed[:99].any()
-    assert not believed[202:].any()

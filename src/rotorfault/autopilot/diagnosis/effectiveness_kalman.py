@@ -18,9 +18,10 @@ from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, verdict
+from rotorfault.autopilot.diagnosis import fault_free, following, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import crossing_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory
+from rotorfault.autopilot.diagnosis.following import FollowingMemory
 from rotorfault.autopilot.diagnosis.glr import GlrParameters, GlrSettings, GlrSignals, start
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.maths.geometry import PerRotor
@@ -53,6 +54,7 @@ class EffectivenessMemory(NamedTuple):
 
     model: ModelMemory
     verdict: verdict.VerdictMemory
+    following: FollowingMemory
 
 
 @final
@@ -72,7 +74,8 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
     def initial(self, inputs: DiagnosisInputs, parameters: EffectivenessParameters) -> EffectivenessMemory:
         """Sound rotors, and nothing else known."""
         model = fault_free.at_start(inputs, parameters.common.model)
-        return EffectivenessMemory(model, verdict.nobody(inputs.vehicle.rotors))
+        rotors = inputs.vehicle.rotors
+        return EffectivenessMemory(model, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
 
     def step(
         self, memory: EffectivenessMemory, inputs: DiagnosisInputs, parameters: EffectivenessParameters, dt: Scalar
@@ -81,7 +84,9 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         p, rotors = parameters.common, inputs.vehicle.rotors
         none, flagged = PerRotor.all(0.0, rotors), memory.verdict.flagged
         drift = none + p.drift
-        model, _ = fault_free.advance(memory.model, inputs, p.model, drift, none, dt, parameters.pull)
+        model, _ = fault_free.advance(
+            memory.model, inputs, p.model, drift, memory.following.stands, dt, parameters.pull
+        )
         mean = PerRotor.of(model.belief.mean[LOSSES : LOSSES + rotors])
         variance = PerRotor.of(model.belief.of(LOSSES + i, LOSSES + i) for i in range(rotors))
         excess = mean.map(lambda x, v: (x - p.least) / sqrt(maximum(v, fault_free.TINY)), variance)
@@ -95,5 +100,10 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         estimate = mean.map(lambda x: clip(x, 0.0, 1.0))
         probability = flags.flagged.map(lambda on, a, b: on * a + (1.0 - on) * b, still, fresh)
         residual = -(estimate * inputs.expectation.thrust)
-        diagnosis = Diagnosis(estimate * flags.flagged, flags.flagged, estimate, residual, probability=probability)
-        return EffectivenessMemory(model, flags), diagnosis, GlrSignals(probability, excess, among, p.threshold)
+        judged, stuck, stands = following.follows(
+            memory.following, model.belief, flags.flagged, inputs, p.following, dt
+        )
+        loss = estimate * flags.flagged
+        diagnosis = Diagnosis(loss, flags.flagged, estimate, residual, stuck=stuck, probability=probability)
+        after = EffectivenessMemory(model, flags, judged)
+        return after, diagnosis, GlrSignals(probability, excess, among, stands, stuck.thrust, p.threshold)

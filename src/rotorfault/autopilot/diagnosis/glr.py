@@ -17,9 +17,10 @@ from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
+from rotorfault.autopilot.diagnosis import fault_free, following, jumps, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import windows_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters
+from rotorfault.autopilot.diagnosis.following import FollowingMemory, FollowingParameters
 from rotorfault.autopilot.diagnosis.kalman import Belief
 from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
@@ -59,6 +60,7 @@ class GlrParameters(NamedTuple):
     drift: Scalar  # 1/s
     persistence: Scalar  # s
     clear_persistence: Scalar  # s
+    following: FollowingParameters
 
 
 class GlrSignals(NamedTuple):
@@ -67,6 +69,8 @@ class GlrSignals(NamedTuple):
     probability: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a rotor is at fault")]
     statistic: Annotated[PerRotor, Q("1", NO_FRAME, "standard deviations by which its loss stands out")]
     among: Annotated[PerRotor, Q("1", NO_FRAME, "1 for the fewest rotors of which one is surely at fault")]
+    stuck: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a flagged rotor does not follow its command")]
+    stuck_thrust: Annotated[PerRotor, Q("N", NO_FRAME, "what a rotor gives that is believed not to follow; else 0")]
     level: Annotated[Scalar, Q("1", NO_FRAME, "standard deviations at which one rotor alone is flagged")]
 
 
@@ -76,6 +80,7 @@ class GlrMemory(NamedTuple):
     model: ModelMemory
     windows: jumps.Windows
     verdict: verdict.VerdictMemory
+    following: FollowingMemory
 
 
 @final
@@ -97,7 +102,7 @@ class Glr(Diagnoser[GlrMemory, GlrParameters]):
         """Nothing is known yet."""
         model, rotors = fault_free.at_start(inputs, parameters.model), inputs.vehicle.rotors
         windows = jumps.nothing_seen(len(model.belief.mean), rotors)
-        return GlrMemory(model, windows, verdict.nobody(rotors))
+        return GlrMemory(model, windows, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
 
     def step(
         self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: GlrParameters, dt: Scalar
@@ -126,7 +131,8 @@ def start(settings: GlrSettings, context: Context, length: tuple[float, ...], th
         At which a rotor alone is flagged.
     """
     s, model = settings, fault_free.model_parameters(settings.model, context)
-    return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence)
+    stuck = following.following_parameters(context, model, s.drift**2)
+    return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence, stuck)
 
 
 def found_and_followed(
@@ -149,9 +155,8 @@ def found_and_followed(
     dt : scalar, s
         Sampling period.
     """
-    p, rotors, flagged = parameters, inputs.vehicle.rotors, memory.verdict.flagged
-    none = PerRotor.all(0.0, rotors)
-    model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, none, dt)
+    p, flagged = parameters, memory.verdict.flagged
+    model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, memory.following.stands, dt)
     windows = jumps.watch(memory.windows, p.length, step, dt)
     found = jumps.best(windows, p.least)
     fresh = verdict.probabilities(evidence(windows, found), p.threshold, flagged)
@@ -159,9 +164,11 @@ def found_and_followed(
     belief = jumps.believe(model.belief, windows, found, new)
     windows = jumps.begun_anew(windows, 1.0 - new.sum())
     flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
-    after = GlrMemory(model._replace(belief=belief), windows, flags)
+    judged, stuck, stands = following.follows(memory.following, belief, flags.flagged, inputs, p.following, dt)
+    diagnosis = diagnosis._replace(stuck=stuck)
+    after = GlrMemory(model._replace(belief=belief), windows, flags, judged)
     among = verdict.fewest(fresh).map(maximum, flags.flagged)
-    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, p.threshold)
+    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, stands, stuck.thrust, p.threshold)
 
 
 def conclude(

@@ -28,7 +28,7 @@ from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
+from rotorfault.autopilot.diagnosis import fault_free, following, jumps, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import HOUR, ratio_threshold
 from rotorfault.autopilot.diagnosis.glr import (
     GlrMemory,
@@ -77,7 +77,8 @@ class MultipleModel(Diagnoser[GlrMemory, MultipleModelParameters]):
     def initial(self, inputs: DiagnosisInputs, parameters: MultipleModelParameters) -> GlrMemory:
         """Nothing is known yet."""
         model, rotors = fault_free.at_start(inputs, parameters.common.model), inputs.vehicle.rotors
-        return GlrMemory(model, jumps.nothing_seen(len(model.belief.mean), rotors), verdict.nobody(rotors))
+        windows = jumps.nothing_seen(len(model.belief.mean), rotors)
+        return GlrMemory(model, windows, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
 
     def step(
         self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: MultipleModelParameters, dt: Scalar

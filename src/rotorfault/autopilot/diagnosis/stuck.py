@@ -109,15 +109,28 @@ def judged(
     square = memory.square + (thrust * thrust - memory.square) * weight
 
     bar = parameters.missed * hover
+    after = StuckMemory(which, since, given, product, square)
+    missed = missed_by(after, bar)
     bar = bar * bar
-    g = clip(product / maximum(square, 1e-9 * bar), 0.0, 1.0)
-    missed = given * given - g * (2.0 * product - g * square)
     known = less(seen.flagged.sum(), 2.5)
     is_stuck = both(both(settled, known), less(bar, missed))
     stuck = which.map(lambda it: both(it, is_stuck))
     held = maximum(given, 0.0)
-    after = StuckMemory(which, since, given, product, square)
     return after, Stuck(stuck, stuck.map(lambda on: select(on, held, 0.0)))
+
+
+def missed_by(memory: StuckMemory, bar: Scalar) -> Scalar:
+    """By how much less a constant misses of the mean square of the thrust that is given than a loss does, in N^2.
+
+    Parameters
+    ----------
+    memory : StuckMemory
+    bar : scalar, N
+        What an explanation may miss.
+    """
+    given, product, square = memory.given, memory.product, memory.square
+    g = clip(product / maximum(square, 1e-9 * bar * bar), 0.0, 1.0)
+    return given * given - g * (2.0 * product - g * square)
 
 
 def _first(flagged: PerRotor) -> PerRotor:
