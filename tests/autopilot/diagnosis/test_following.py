@@ -11,6 +11,7 @@ from gates import needs_simd
 import rotorfault as rf
 from rotorfault.autopilot.diagnosis import fault_free
 from rotorfault.autopilot.diagnosis.following import following_parameters
+from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.model.block import Context
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.sensor_model import SensorModel, SensorNoise
@@ -55,7 +56,7 @@ def test_a_rotor_that_lost_a_share_is_not(loss: float) -> None:
 def test_noise_makes_it_late() -> None:
     def late(noise: float) -> float:
         context = Context(VEHICLE, 0.001, SensorModel(rates=SensorNoise(noise)))
-        model = fault_free.model_parameters(fault_free.ModelSettings(), context)
+        model = fault_free.model_parameters(ModelSettings(), context)
         return float(following_parameters(context, model, 0.25).lateness)
 
     # The root of the noise: R is its square, of which the fourth root counts.

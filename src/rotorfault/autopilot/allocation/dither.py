@@ -36,7 +36,8 @@ from pydantic import Field
 from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.effectiveness import allocated
 from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
-from rotorfault.autopilot.diagnosis.fault_free import ModelSettings, model_parameters
+from rotorfault.autopilot.diagnosis.fault_free import model_parameters
+from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
