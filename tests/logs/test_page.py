@@ -54,7 +54,7 @@ def test_registered_sources_name_the_motors_of_the_log() -> None:
     (said,) = [one for one in found.detectors if one.detector == "luenberger"]
     assert [rotor for rotor, time, _ in said.flags if time > 29.0][:1] == [2]
     assert found.json()["detectors"]
-    assert "registered sources flag it too" in found.probable.evidence
+    assert "registered sources flag it first" in found.probable.evidence
     assert "luenberger flags rotor 2 from" in str(found)
     alone = diagnosis_of(log)  # they count as no further evidence: the records are the same
     assert [one.probability for one in alone.causes] == [one.probability for one in found.causes]

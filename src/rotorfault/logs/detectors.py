@@ -8,6 +8,7 @@ and knows no baseline and no alternatives.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,6 +31,7 @@ from rotorfault.model.vehicle import rotor_speeds
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
 
 FINEST, MOST_STEPS = 0.004, 40_000  # s of a step, and steps of a log
+EARLY, SOON = 0.5, 0.5  # s before an onset that a flag may be of it, and after a flag in which a loss is believed
 NEAR = 0.35  # of the longest arm: how far a motor of the log may be from a rotor of the vehicle
 
 
@@ -37,8 +39,19 @@ class Said(NamedTuple):
     """What one source says of a flight."""
 
     detector: str
-    flags: tuple[tuple[int, float, float], ...]  # motor of the log, s of its first flag, believed loss at the end
+    flags: tuple[tuple[int, float, float], ...]  # motor of the log, s of its first flag, loss believed soon after
     note: str  # why it could not run; empty if it did
+
+    def first(self, onset: float | None) -> tuple[int, float, float] | None:
+        """The first flag of what begins at an onset; what comes later may be what a crash looks like.
+
+        Parameters
+        ----------
+        onset : float or None, s
+            None for what was there from the beginning.
+        """
+        since = -math.inf if onset is None else onset - EARLY
+        return next((flag for flag in self.flags if flag[1] >= since), None)
 
 
 def order_of(log: Log, vehicle: VehicleFile) -> list[int]:
@@ -139,9 +152,10 @@ def _run(name: str, log: Log, span: tuple[float, float], hover: Hover, file: Veh
                 past = past._replace(previous=motion_of(estimate, vehicle.tilt != ()))
             memory, diagnosis, _ = part.step(memory, inputs, numbers, step)
             for rotor, (flagged, loss) in enumerate(zip(diagnosis.flagged, diagnosis.loss, strict=True)):
-                losses[rotor] = float(loss)
                 if flagged > 0.5 and rotor not in first:
                     first[rotor] = float(time[k])
+                if rotor in first and time[k] <= first[rotor] + SOON:
+                    losses[rotor] = max(losses[rotor], float(loss))
             sent = PerRotor.of(newton[k].tolist())
             rotors, before = follow(past.rotors, sent, vehicle, step), instant.expectation
             past = Past(rotors, before.now, Command(sent, zeros()), step, before.speed)

@@ -134,8 +134,8 @@ def seconded(cause: Cause, said: Sequence[Said]) -> Cause:
     if cause.rotor is None:
         quiet = sum(not one.flags for one in ran)
         return cause._replace(evidence=f"{cause.evidence}; {quiet} of {len(ran)} registered sources flag nobody")
-    same = sum(any(rotor == cause.rotor for rotor, *_ in one.flags) for one in ran)
-    return cause._replace(evidence=f"{cause.evidence}; {same} of {len(ran)} registered sources flag it too")
+    same = sum((flag := one.first(cause.onset)) is not None and flag[0] == cause.rotor for one in ran)
+    return cause._replace(evidence=f"{cause.evidence}; {same} of {len(ran)} registered sources flag it first")
 
 
 def shaking_words(log: Log, now: Shaking, baseline: Baseline | None) -> list[str]:

@@ -161,13 +161,18 @@ def _said(one: Said, log: Log, first: Cause) -> str:
         return f"{one.detector}: {one.note}"
     if not one.flags:
         return f"{one.detector} flags nobody" + ("" if first.rotor is None else ", other than the verdict")
-    flags = []
-    for rotor, time, loss in one.flags:
-        since = first.onset if rotor == first.rotor else None
-        late = f", {time - since:.2f} s after the onset" if since is not None and time >= since else ""
-        flags.append(f"rotor {rotor} from {when(log, time)}{late}, and believes that {100.0 * loss:.0f} % is lost")
-    same = any(rotor == first.rotor for rotor, *_ in one.flags)
-    return f"{one.detector} flags " + "; ".join(flags) + ("" if same else "; the verdict does not")
+    flag = one.first(first.onset)
+    if flag is None:
+        return f"{one.detector} flags nobody from the onset on, other than the verdict"
+    rotor, time, loss = flag
+    late = f", {time - first.onset:.2f} s after the onset" if first.onset is not None and time >= first.onset else ""
+    believed = f", and believes that {100.0 * loss:.0f} % is lost" if loss > 0.0 else ""
+    text = f"{one.detector} flags rotor {rotor} from {when(log, time)}{late}{believed}"
+    others = {True: "before", False: "later"}
+    for before, word in others.items():
+        more = [str(number) for number, at, _ in one.flags if number != rotor and (at < time) == before]
+        text += f"; {word} rotor{'s' if len(more) > 1 else ''} {', '.join(more)}" if more else ""
+    return text + ("" if rotor == first.rotor else "; the verdict does not")
 
 
 def _named(cause: Cause) -> str:
