@@ -1,6 +1,7 @@
 """Is the Kalman filter as sure as it should be? Innovations and errors within their chi-square bands.
 
-    python benchmarks/estimator_consistency.py [--flights 1000] [--seconds 10] [--only SET ...] [--json FILE]
+    python benchmarks/estimator_consistency.py [--flights 1000] [--seconds 10] [--only SET ...] [--seed 1]
+        [--json FILE]
 
 Hover in gusts of 5 m/s without a fault, by a Hummingbird; noise, biases and gusts anew in each flight. At each
 recorded instant: the mean over all flights of the normalised innovations squared over how many there were, and of the
@@ -40,7 +41,9 @@ def band(count: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def flown(sensors: str, flights: int, seconds: float, changes: dict[str, Any]) -> tuple[list[str], Array]:
+def flown(
+    sensors: str, flights: int, seconds: float, changes: dict[str, Any], seed: int = 1
+) -> tuple[list[str], Array]:
     """Names of the rows of a recording, and the recording: (times, rows, flights)."""
     height = HEIGHT[sensors]
     settings: dict[str, Any] = {
@@ -54,7 +57,7 @@ def flown(sensors: str, flights: int, seconds: float, changes: dict[str, Any]) -
     pieces, names = [], []
     for first in range(0, flights, CHUNK):
         count = min(CHUNK, flights - first)
-        seeds = np.arange(first + 1, first + count + 1, dtype=np.int64)
+        seeds = np.arange(first, first + count, dtype=np.int64) + seed
         batch = assemble_group(Group(scenario, np.arange(count), {}, seeds))
         rows = list(batch.loop.layout.rows)
         kept = [
@@ -82,9 +85,9 @@ def turned(rows: list[str], signals: Array) -> Array:
     )  # fmt: skip
 
 
-def measured(sensors: str, flights: int, seconds: float, changes: dict[str, Any]) -> dict[str, Any]:
+def measured(sensors: str, flights: int, seconds: float, changes: dict[str, Any], seed: int = 1) -> dict[str, Any]:
     """Normalised squares of a set of sensors, by time."""
-    rows, signals = flown(sensors, flights, seconds, changes)
+    rows, signals = flown(sensors, flights, seconds, changes, seed)
     kept = ~np.isnan(signals).any(axis=(0, 1))
     signals = signals[:, :, kept]
     square, count = (signals[:, rows.index(f"estimator.{name}")] for name in ("nis", "measured"))
@@ -127,13 +130,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=1, help="of the first flight")
     parser.add_argument("--only", nargs="+", choices=list(HEIGHT), default=list(HEIGHT))
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="other settings")
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
     results = {}
     for sensors in chosen.only:
-        results[sensors] = one = measured(sensors, chosen.flights, chosen.seconds, parse_overrides(chosen.set))
+        results[sensors] = one = measured(
+            sensors, chosen.flights, chosen.seconds, parse_overrides(chosen.set), chosen.seed
+        )
         low, high = one["innovations_band"]
         print(f"\n{sensors}, {one['flights']} flights ({one['lost']} lost)")
         print(f"innovations {one['innovations']:.4f} (95 % band {low:.4f} to {high:.4f})")

@@ -169,6 +169,24 @@ def test_a_late_measurement_is_compared_with_the_state_when_it_was_taken(every: 
         places = [place - dv * DT * (k - at) for at, place in enumerate(places)]
 
 
+def test_the_slow_error_of_a_late_source_counts_from_when_it_measured() -> None:
+    """The first reading that arrives was taken at the start, where the error is 0: nothing walks before."""
+    late = 6
+    position = SensorNoise(0.5, Timing(5, late), wander=1.7, wander_time=60.0)
+    made, memory = Eskf(), None
+    numbers = made.parameters(Context(VEHICLE, DT, MODEL._replace(position=position)))
+    for k in range(late + 3):
+        readings = Readings(
+            Reading(zeros(), 0.0), Reading(zeros(), 0.0), Reading(Quat.identity(), 0.0),
+            Reading(zeros()), Reading(Vec3(0.0, 0.0, VEHICLE.gravity)),
+        )  # fmt: skip
+        inputs = EstimatorInputs(readings, VEHICLE, PerRotor.all(1.0))
+        memory = made.initial(inputs, numbers) if memory is None else memory
+        memory = made.step(memory, inputs, numbers, DT)[0]
+        walked = 1.7**2 * (1.0 - math.exp(-2.0 * DT * max(k - late, 0) / 60.0))
+        assert Filter(memory.covariance, 18)[15, 15] == pytest.approx(walked, rel=1e-6, abs=2e-12), k
+
+
 def test_what_it_needs_to_know_is_named() -> None:
     inputs = EstimatorInputs(Readings(position=Reading(zeros())), VEHICLE, PerRotor.all(1.0))
     made = Eskf()

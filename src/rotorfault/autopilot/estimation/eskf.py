@@ -301,7 +301,10 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         slow = []
         for group, value in zip(States.of(sensors).slow, memory.slow, strict=True):
             noise = group.noise
-            factor = 1.0 + running * (exp(-parameters.period / noise.wander_time) - 1.0)
+            # What counts is the error of the reading that arrives now; the first was taken at the start.
+            late = noise.timing.late
+            begun = greater(memory.count, late + 0.5) if late else running
+            factor = 1.0 + begun * (exp(-parameters.period / noise.wander_time) - 1.0)
             for state in group.states:
                 filter_.scale(state, factor)
                 filter_.blur(state, noise.wander * noise.wander * (1.0 - factor * factor))
