@@ -114,3 +114,13 @@ def test_most_that_are_thrown_without_a_rotor_come_back() -> None:
     }
     found = rf.fly_many("hover-fault", {**turns, "seed": np.arange(count)}, settings=settings).table
     assert np.count_nonzero(found["survived"]) >= 41  # of 48 with a share of 0.95 fewer come back in 1 % of runs
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+def test_a_slow_command_filter_does_not_shake_a_body_that_spins() -> None:
+    """Preset `spin` filters commands at 8 rad/s; without rotors 1 and 2 the position loop swung by a metre."""
+    settings = {**lose("mueller-2014", (1, 2)), "controller": {"kind": "roismc", "preset": "spin"}, "duration": 15.0}
+    found = rf.fly_many("hover-fault", {"seed": list(range(4))}, settings=settings).table.to_pandas()
+    assert found["survived"].all()
+    assert found["late_position_rms"].max() < 0.4

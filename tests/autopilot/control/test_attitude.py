@@ -79,10 +79,25 @@ def test_a_heading_that_is_off_costs_the_thrust_axis_nothing(n: tuple[float, flo
 @pytest.mark.parametrize("attitude", [(math.pi, 0.0, 0.3), (0.0, math.pi / 2.0, 0.0), (2.0, -1.0, 1.0)])
 def test_every_attitude_has_a_finite_error(attitude: tuple[float, float, float]) -> None:
     q_WB = Quat.from_euler(Vec3(*attitude))
-    found = wanted_at(SO3.start(q_WB), q_WB)
+    found = wanted_at(SO3.start(q_WB, 1.0), q_WB)
     assert all(np.isfinite([*arr(found.e), *arr(found.rate), *arr(found.acceleration)]))
     upside_down = wanted_at(AttitudeReference(zeros(), zeros()), q_WB)
     assert all(np.isfinite([*arr(upside_down.e), *arr(upside_down.rate), *arr(upside_down.acceleration)]))
+
+
+def test_the_command_of_a_body_upside_down_begins_at_the_largest_tilt_that_way() -> None:
+    most = math.tan(0.7)
+    for tilt in (2.0, 3.0, math.pi):
+        q_WB = Quat.from_euler(Vec3(tilt, 0.0, 0.4))
+        n = arr(SO3.start(q_WB, most).attitude)[:2]
+        assert 2.0 * math.atan(0.5 * math.hypot(*n)) <= 0.7 + 1e-9
+        if tilt < math.pi:  # hanging straight down it has no side
+            axis = q_WB.z_axis()
+            np.testing.assert_allclose(n / math.hypot(*n), arr(axis)[:2] / math.hypot(axis.x, axis.y), atol=1e-9)
+            assert 2.0 * math.atan(0.5 * math.hypot(*n)) == pytest.approx(0.7)
+    # At less than a right angle it begins where the body is, beyond the largest tilt too.
+    n = arr(SO3.start(Quat.from_euler(Vec3(1.2, 0.0, 0.0)), most).attitude)[:2]
+    assert 2.0 * math.atan(0.5 * math.hypot(*n)) == pytest.approx(1.2)
 
 
 @given(state=states, spin=st.floats(-20.0, 20.0))

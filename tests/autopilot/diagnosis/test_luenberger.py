@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from gates import needs_simd
 from numpy.typing import NDArray
 from scipy.signal import place_poles
 
+import rotorfault as rf
 from rotorfault.autopilot.diagnosis import DiagnosisInputs
 from rotorfault.autopilot.diagnosis.decision import DecisionSettings
 from rotorfault.autopilot.diagnosis.luenberger import Luenberger, LuenbergerSettings, place
@@ -250,3 +252,16 @@ def test_an_equal_loss_of_all_is_the_price() -> None:
     seen = watch(observer(), (0.2, 0.2, 0.2, 0.2))
     np.testing.assert_allclose(seen.share[-1], 0.2, atol=1e-5)
     assert not seen.flagged.any()
+
+
+@needs_simd
+@pytest.mark.filterwarnings("ignore")
+def test_upside_down_the_missing_thrust_stays_bounded() -> None:
+    """Held upside down by its start: the deviation grew to 1e19 N, in which every difference drowned."""
+    settings = {"vehicle": "mueller-2014", "controller.preset": "hummingbird", "diagnosis.kind": "luenberger"}
+    start = {"start.attitude": [3.0, 0.0, 0.0], "start.position": [0.0, 0.0, 60.0], "duration": 1.5}
+    fault = {"fault": [{"kind": "total", "rotor": 1, "time": 0.0}]}
+    data = rf.fly("hover-fault", settings={**settings, **start, **fault}).data
+    upside_down = np.cos(data["attitude"][:, 0]) * np.cos(data["attitude"][:, 1]) < 0.0
+    assert float(upside_down.sum()) * 1e-3 > 0.1
+    assert float(np.abs(data["thrust_residual"]).max()) < 100.0

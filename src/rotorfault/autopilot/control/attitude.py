@@ -34,7 +34,7 @@ from typing import Literal, NamedTuple, Protocol, final
 
 from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.rotation import Quat
-from rotorfault.maths.scalar import Scalar, atan2, exp, maximum, sqrt, wrap_angle
+from rotorfault.maths.scalar import Scalar, atan2, exp, less, maximum, select, sqrt, wrap_angle
 from rotorfault.model.signals import Estimate, Reference
 
 Tracking = Literal["so3", "euler"]
@@ -65,8 +65,16 @@ class Wanted(NamedTuple):
 class AttitudeTracking(Protocol):
     """How the cascade tracks attitude."""
 
-    def start(self, q_WB: Quat) -> AttitudeReference:
-        """State of the command filter at an attitude, at rest."""
+    def start(self, q_WB: Quat, tilt_tangent: Scalar) -> AttitudeReference:
+        """State of the command filter at an attitude, at rest.
+
+        Parameters
+        ----------
+        q_WB : Quat
+            Attitude.
+        tilt_tangent : scalar
+            Of the largest tilt that is ever demanded; rotations begin there where the body hangs upside down.
+        """
         ...
 
     def track(
@@ -172,7 +180,7 @@ def _heading(R_WB: Mat3) -> tuple[Scalar, Scalar]:
 class EulerTracking:
     """Euler angles, their rates taken for body rates."""
 
-    def start(self, q_WB: Quat) -> AttitudeReference:
+    def start(self, q_WB: Quat, tilt_tangent: Scalar) -> AttitudeReference:
         """At the attitude's angles."""
         return AttitudeReference(q_WB.euler(), zeros())
 
@@ -208,10 +216,14 @@ class EulerTracking:
 class RotationTracking:
     """Thrust axis first, heading about it: an error on SO(3)."""
 
-    def start(self, q_WB: Quat) -> AttitudeReference:
-        """At the attitude's thrust axis and heading."""
+    def start(self, q_WB: Quat, tilt_tangent: Scalar) -> AttitudeReference:
+        """At the attitude's thrust axis and heading; of what hangs upside down at the largest tilt that way."""
         axis = q_WB.z_axis()
         lean = 2.0 / maximum(1.0 + axis.z, _LEAST)
+        # Upside down the filter would hold the body there for the time that it takes to come to what is demanded.
+        across = sqrt(axis.x * axis.x + axis.y * axis.y)
+        most = 2.0 * tilt_tangent / (1.0 + sqrt(1.0 + tilt_tangent * tilt_tangent))
+        lean = select(less(axis.z, 0.0), most / maximum(across, _LEAST), lean)
         return AttitudeReference(Vec3(axis.x * lean, axis.y * lean, q_WB.heading()), zeros())
 
     def track(

@@ -186,7 +186,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
     def initial(self, inputs: ControlInputs, parameters: CascadeParameters) -> CascadeMemory:
         """Memory before the first step; the command filter starts at the estimated attitude."""
         estimate, level = inputs.estimate, zeros()
-        at = self.tracking.start(estimate.q_WB)
+        at = self.tracking.start(estimate.q_WB, parameters.tilt_tangent)
         start = level_attitude() if self.settings.six_inputs else at
         nothing = Prediction(level, level)
         position = _position_error(estimate, inputs.reference, nothing, level)
@@ -236,6 +236,7 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         if spinning is None:
             turn = self.tracking.track(memory.reference, estimate, R_WB, axis_W, reference, bandwidth, dt)
         else:
+            bandwidth = spinning.filter_bandwidth(bandwidth, outer)
             turn = spinning.track(self.tracking, memory.reference, R_WB, axis_W, bandwidth)
 
         # Attitude loop: torque.

@@ -34,6 +34,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rotorfault.autopilot.control.lean import lean_in_balance
 from rotorfault.autopilot.control.spin_riccati import (
     Complex,
     Poles,
@@ -46,7 +47,6 @@ from rotorfault.autopilot.control.steady_force import SteadyForce
 from rotorfault.maths.geometry import Mat3, PerRotor, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, clip, greater, maximum, minimum, select, sqrt
-from rotorfault.model.aerodynamics import Aerodynamics
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import effect_of, mean_bandwidth, torque_of_motion
 from rotorfault.model.signals import Diagnosis, Wrench
@@ -56,7 +56,6 @@ YAW_LOST = 0.95  # of the weight. Our choice: a twentieth below, hover that hold
 # Of the weight: a rotor that can give less bounds nothing. Diagnosis says of a dead one that a few percent are left,
 # and its share of a balance would be the most that there is. Our choice: a fifth or less of what a sound one gives.
 LEAST_LIVING = 0.1
-LEAST_RATE = 1.0  # rad/s: a body that turns slower has no axis of its own
 RIDGE = 1e-6  # relative
 MOST = 10.0  # of the weight: more thrust than is ever asked for
 LEAST_CARRIED = 0.1  # of the weight
@@ -189,7 +188,7 @@ def relaxed_axis(
     given_up = maximum(free, yaw_given_up(vehicle, 2.0 * weight - with_yaw.least))
     most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
     tau = wrench_of(vehicle, balance).torque_B
-    wanted = lean_in_balance(vehicle, tau, omega_B.z, residual_speed) * given_up
+    wanted = lean_in_balance(vehicle, tau, omega_B.z, residual_speed, parameters.lean) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
     lean = memory.lean + (wanted - memory.lean) * (dt / (parameters.time + dt))
@@ -314,24 +313,6 @@ def attainable(vehicle: Vehicle, believed: Diagnosis, wrench: Wrench, fades: Sca
     share = clip(beyond.reduce(maximum), 0.0, 1.0) * several * fades
     chosen: PerRotor = thrust + (again - thrust) * share
     return wrench_of(vehicle, chosen.map(clip, low, high) + held)
-
-
-def lean_in_balance(vehicle: Vehicle, tau: Vec3, spin: Scalar, residual_speed: Scalar | Vec3) -> Vec3:
-    """(n_x, n_y)/n_z of the axis about which a spinning body balances a tilt torque."""
-    J, momentum = vehicle.inertia, rotor_momentum(vehicle, residual_speed)
-    d = vehicle.air.damping if isinstance(vehicle.air, Aerodynamics) else zeros()
-    # What does not go by p and q turns a body whose axes are no principal ones, or whose rotors are tilted.
-    if isinstance(vehicle.inertia_products, Vec3):
-        xy, xz, yz = vehicle.inertia_products * spin
-        tau, d = tau + Vec3(yz, -xz, 0.0) * spin, Vec3(d.x - xy, d.y + xy, d.z)
-    if isinstance(momentum, Vec3):
-        tau, momentum = tau + Vec3(momentum.y, -momentum.x, 0.0) * spin, momentum.z
-    cx, cy = (J.y - J.z) * spin - momentum, (J.z - J.x) * spin + momentum
-    # (p, q)/r by Cramer's rule. Where the body hardly turns, or has no balance, the floors keep it finite.
-    fast = maximum(spin * spin, LEAST_RATE * LEAST_RATE)
-    tiny = 1e-6 * (J.x * J.y) * LEAST_RATE * LEAST_RATE
-    scale = spin / (maximum(d.x * d.y - cx * cy, tiny) * fast)
-    return Vec3((d.y * tau.x + cx * tau.y) * scale, (cy * tau.x + d.x * tau.y) * scale, 0.0)
 
 
 def relaxed_torque(

@@ -20,7 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorfault.autopilot.control.relaxed import lean_in_balance, spinning_thrust
+from rotorfault.autopilot.control.lean import lean_in_balance
+from rotorfault.autopilot.control.relaxed import spinning_thrust
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten, statics

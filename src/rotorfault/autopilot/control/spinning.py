@@ -7,7 +7,7 @@ from typing import final
 from rotorfault.autopilot.allocation.available import HOVER_RESERVE
 from rotorfault.autopilot.control.attitude import AttitudeReference, AttitudeTracking, Wanted
 from rotorfault.autopilot.control.force_limits import LEAST_COSINE, LEAST_THRUST
-from rotorfault.autopilot.control.protocol import ControlInputs
+from rotorfault.autopilot.control.protocol import ControlInputs, LawOutput
 from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
     RelaxedParameters,
@@ -18,14 +18,18 @@ from rotorfault.autopilot.control.relaxed import (
     relaxed_torque,
 )
 from rotorfault.autopilot.control.steady_force import observed, unexplained
+from rotorfault.autopilot.control.tumbling import lifts, without_haste
 from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum
+from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum, sqrt
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Wrench
 
 # Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
 # rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
 FASTEST = 10.0
+# Command filter over the position loop's crossover, at least: a double pole there costs 25 degrees of phase. Our
+# choice: a critically damped loop has 67 degrees without it, and the axis of a body that spins takes its share too.
+FILTER_AHEAD = 4.5
 
 
 @final
@@ -58,6 +62,10 @@ class Spinning:
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
         self._unexplained_W = unexplained(memory.steady, estimate.v_W)
+        # How much the axis points up: 1 if it does, 0 from 73 degrees on.
+        to_B = self.axis.to_B
+        upwards = (estimate.q_WB.matrix() @ Vec3(to_B.xz, to_B.yz, to_B.zz)).z
+        self._points = clip((upwards - LEAST_COSINE) * (1.0 / (1.0 - LEAST_COSINE)), 0.0, 1.0)
 
     @property
     def steady_W(self) -> Vec3:
@@ -80,9 +88,27 @@ class Spinning:
         inputs = self.inputs
         weight = inputs.vehicle.mass * inputs.vehicle.gravity
         most = minimum(self.axis.thrust, HOVER_RESERVE * weight / share)
-        # Where yaw is not even braked there is nothing to spare thrust for: all that balances stops a fall.
-        given_up = maximum(most * self.axis.given_up, self.axis.thrust * self.axis.free)
-        return maximum(inputs.thrust_available, given_up)
+        # Where yaw is not even braked there is nothing to spare thrust for: all that balances stops a fall, as far as
+        # the axis points up. Elsewhere it pushes away, and leaves rotors at their limits no torque to turn there.
+        falling = (most + (self.axis.thrust - most) * self._points) * self.axis.free
+        return maximum(inputs.thrust_available, maximum(most * self.axis.given_up, falling))
+
+    def filter_bandwidth(self, bandwidth: Scalar, outer: LawOutput) -> Scalar:
+        r"""Double pole of the command filter in rad/s: as far as yaw is free, fast enough for the position loop.
+
+        The loop :math:`(k_2s + k_1)/s^2` crosses at :math:`\sqrt{k_1 + k_2^2}` at most. A body that holds yaw keeps
+        the filter that it was given.
+
+        Parameters
+        ----------
+        bandwidth : scalar, rad/s
+            Given.
+        outer : LawOutput
+            Of the position loop.
+        """
+        k1, k2 = outer.gain_e, outer.gain_rate
+        crosses = sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))
+        return bandwidth + maximum(FILTER_AHEAD * crosses - bandwidth, 0.0) * (self.axis.free * self._points)
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
@@ -124,11 +150,13 @@ class Spinning:
         after, torque_B = relaxed_torque(
             self.axis, self._error, given.torque_B, switching_B, vehicle, residual_speed, self.parameters
         )
+        hastes = without_haste(torque_B, inputs.estimate.omega_B, vehicle, inputs.diagnosis)
+        torque_B = torque_B + (hastes - torque_B) * self.axis.free
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
-        lifts = clip(self.cosine / LEAST_COSINE, 0.0, 1.0)
-        relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
+        worth = lifts(R_WB, inputs.estimate.omega_B, vehicle)
+        relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - worth).torque_B
         beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         # About yaw what is attainable beside a rotor stuck high is its own: asked for that, it could never show that
@@ -136,7 +164,7 @@ class Spinning:
         free = minimum(self.axis.free, given_up)
         tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
         yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
-        thrust = upright.thrust * (1.0 - free + lifts * free)
+        thrust = upright.thrust * (1.0 - free + worth * free)
         lifted_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz) * (given.thrust / vehicle.mass) - Vec3(0.0, 0.0, vehicle.gravity)
         explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
         after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))

@@ -236,7 +236,10 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             missing = inputs.expectation.thrust * (memory.decision.smoothed * memory.decision.flagged)
             believed = over_inertia(vehicle, wrench_of(vehicle, -missing).torque_B)
             delta_omega = delta_omega + (believed - delta_omega).times(blind)
-        delta_z = delta_z + dynamics.gain_deviation * innovation_z / maximum(cosine, LEAST_COSINE)
+        # By the sign of the cosine too: upside down the missing thrust is missing downwards, and a gain that takes it
+        # for upwards lets the deviation grow without bound.
+        upwards = cosine / maximum(cosine * cosine, LEAST_COSINE * LEAST_COSINE)
+        delta_z = delta_z + dynamics.gain_deviation * innovation_z * upwards
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
         deviation = Wrench(vehicle.mass * delta_z, body_momentum(vehicle, delta_omega))

@@ -7,10 +7,14 @@ from typing import ClassVar, NamedTuple
 from rotorfault.autopilot.instant import Decision, Instant
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.base.one_line import record_line
+from rotorfault.maths.scalar import Scalar, maximum, minimum
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Diagnosis, Estimate, Reference
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
+
+# Detectors tell losses to within 0.1 (`threshold` and `least` of their settings); the blend begins at twice that.
+NEARLY_DEAD = 0.8
 
 
 class ResponseInputs(NamedTuple):
@@ -38,10 +42,25 @@ class Response(Block[ResponseInputs, Decision, MemoryT, ParametersT]):
     lands: ClassVar[bool] = False
 
 
+def counted_upon(loss: Scalar) -> Scalar:
+    """The loss that is flown with: of a rotor of which hardly anything is left, all of it.
+
+    A detector approaches the loss of a dead rotor from below and stays some percent short of it. An autopilot that
+    counts upon those percent waits for torque that never comes. From a loss of `NEARLY_DEAD` on what is believed to
+    be left shrinks, to nothing where half of the rest is gone.
+
+    Parameters
+    ----------
+    loss : scalar
+        Believed, 0 to 1.
+    """
+    return minimum(maximum(loss, 2.0 * loss - NEARLY_DEAD), 1.0)
+
+
 def _inputs(instant: Instant) -> ResponseInputs:
-    return ResponseInputs(
-        instant.estimate, instant.reference, instant.diagnosis, instant.expectation, instant.vehicle
-    )
+    seen = instant.diagnosis
+    believed = seen._replace(loss=seen.loss.map(counted_upon))
+    return ResponseInputs(instant.estimate, instant.reference, believed, instant.expectation, instant.vehicle)
 
 
 ON_FAULT = Slot(
