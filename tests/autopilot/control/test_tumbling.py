@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 import rotorfault as rf
 from rotorfault.autopilot.control.lean import lean_in_balance
-from rotorfault.autopilot.control.tumbling import APPROACH, STOPS_WITHIN, lifts, without_haste
+from rotorfault.autopilot.control.tumbling import APPROACH, STOPS_WITHIN, without_haste
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.rotation import Quat
 from rotorfault.model.signals import Diagnosis, healthy
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
@@ -63,21 +62,6 @@ def test_one_way_is_forbidden_and_the_other_is_not() -> None:
         assert turned.y == pytest.approx(0.3 * sign)
     sound = without_haste(Vec3(0.3, 0.0, 0.0), Vec3(5.0, 0.0, 0.0), vehicle, without())
     assert sound.x == pytest.approx(0.3)
-
-
-def test_thrust_lifts_where_it_will_point_up() -> None:
-    vehicle = mueller()
-    level, over = Quat.from_euler(Vec3(0.0, 0.0, 0.3)).matrix(), Quat.from_euler(Vec3(math.pi, 0.0, 0.0)).matrix()
-    assert lifts(level, Vec3(0.0, 0.0, 20.0), vehicle) == 1.0
-    assert lifts(over, Vec3(0.0, 0.0, 20.0), vehicle) == pytest.approx(0.0, abs=1e-5)
-    # On its side it lifts if it turns upright, and not if it turns over: sign by the motion itself.
-    side, h = Vec3(math.pi / 2.0, 0.0, 0.0), 1e-5
-    rising = math.cos(side.x + h) > math.cos(side.x)
-    for rate in (15.0, -15.0):
-        comes = lifts(Quat.from_euler(side).matrix(), Vec3(rate, 0.0, 20.0), vehicle)
-        assert (comes > 0.5) == (rising == (rate > 0.0))
-    # Faster than the rotors follow it points everywhere; about its own axis it does not.
-    assert lifts(over, Vec3(90.0, 0.0, 5.0), vehicle) == 1.0
 
 
 def test_the_axis_of_balance_passes_through_body_z() -> None:

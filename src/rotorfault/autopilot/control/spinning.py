@@ -18,7 +18,7 @@ from rotorfault.autopilot.control.relaxed import (
     relaxed_torque,
 )
 from rotorfault.autopilot.control.steady_force import observed, unexplained
-from rotorfault.autopilot.control.tumbling import lifts, without_haste
+from rotorfault.autopilot.control.tumbling import without_haste
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum, sqrt
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
@@ -155,8 +155,8 @@ class Spinning:
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
         carried = minimum(upright.thrust, weight * maximum(self.cosine, LEAST_THRUST))
-        worth = lifts(R_WB, inputs.estimate.omega_B, vehicle)
-        relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - worth).torque_B
+        lifts = clip(self.cosine / LEAST_COSINE, 0.0, 1.0)
+        relaxed_B = attainable(vehicle, inputs.diagnosis, Wrench(carried, torque_B), 1.0 - lifts).torque_B
         beyond = absolute(self.omega.z) / (FASTEST * mean_bandwidth(vehicle))
         given_up = given_up * clip(2.0 - beyond, 0.0, 1.0)
         # About yaw what is attainable beside a rotor stuck high is its own: asked for that, it could never show that
@@ -164,7 +164,7 @@ class Spinning:
         free = minimum(self.axis.free, given_up)
         tilt_B = upright.torque_B + (relaxed_B - upright.torque_B) * given_up
         yaw = upright.torque_B.z + (relaxed_B.z - upright.torque_B.z) * free
-        thrust = upright.thrust * (1.0 - free + worth * free)
+        thrust = upright.thrust * (1.0 - free + lifts * free)
         lifted_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz) * (given.thrust / vehicle.mass) - Vec3(0.0, 0.0, vehicle.gravity)
         explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
         after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))

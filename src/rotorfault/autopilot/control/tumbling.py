@@ -1,4 +1,4 @@
-r"""What a body without some rotors must not do while it tumbles: speed up what it cannot brake, or lift itself down.
+r"""What a body without some rotors must not do while it tumbles: speed up what it cannot brake.
 
 **Tilt rate.** A quadrotor without rotor 1 has torque in one direction only about the arm of rotor 1. Asked to turn
 over that way it speeds up, and nothing takes the rate back but the gyroscopic torque of a spin that it has not got
@@ -10,17 +10,12 @@ yet: it tumbles until it has. So no torque speeds a tilt rate up beyond what the
 
 with d the direction of the tilt rate and :math:`\tau_i` the tilt torque of rotor i per thrust. Where all rotors live
 B is as large one way as the other, and the bound is far from anything that is asked for.
-
-**Thrust.** It lifts by the cosine of the tilt, at the time when the rotors have followed; from level with the horizon
-downwards it is for torque alone. A body that tumbles faster than its rotors follow points everywhere before they
-have: there thrust lifts as much as it pulls down, and what it does is spin the body, which is what it lacks.
 """
 
 from __future__ import annotations
 
-from rotorfault.autopilot.control.force_limits import LEAST_COSINE
-from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, sqrt
+from rotorfault.maths.geometry import Vec3
+from rotorfault.maths.scalar import absolute, maximum, sqrt
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import effect_of, mean_bandwidth
 from rotorfault.model.signals import Diagnosis
@@ -60,23 +55,3 @@ def without_haste(torque_B: Vec3, omega_B: Vec3, vehicle: Vehicle, believed: Dia
     allowed = maximum(most - rate, 0.0) * (across * APPROACH * mean_bandwidth(vehicle))
     less: Vec3 = torque_B - along * maximum(torque_B.dot(along) - allowed, 0.0)
     return less
-
-
-def lifts(R_WB: Mat3, omega_B: Vec3, vehicle: Vehicle) -> Scalar:
-    """0 to 1: how much of a thrust is worth asking for beyond what torque needs.
-
-    Parameters
-    ----------
-    R_WB : Mat3
-        Attitude.
-    omega_B : Vec3, rad/s
-        Body rates.
-    vehicle : Vehicle
-        As believed.
-    """
-    w0 = mean_bandwidth(vehicle)
-    rising = R_WB.zx * omega_B.y - R_WB.zy * omega_B.x
-    upright = clip((R_WB.zz + rising / w0) / LEAST_COSINE, 0.0, 1.0)
-    tilting = sqrt(omega_B.x * omega_B.x + omega_B.y * omega_B.y + 1e-9)
-    tumbles = clip((tilting - absolute(omega_B.z)) / w0, 0.0, 1.0)
-    return maximum(upright, tumbles)
