@@ -3,7 +3,7 @@
     python benchmarks/thrown.py [--flights 100] [--height 10] [--only LABEL ...]
 
 Vehicles, their air and presets are those of the study `total-loss`, the law is ROISMC. The rotors are gone from the
-first instant; mean wind of 5 m/s with gusts of Dryden's spectrum (5 m/s at 6 m), noisy sensors, 11 s. Each flight once
+first instant; mean wind of 5 m/s with gusts of Dryden's spectrum (5 m/s at 6 m), noisy sensors, 11 s. Each once
 with the Luenberger observer, which starts with it and knows nothing, and once told at once, as by an autopilot that
 flew when the rotor was lost. Survived, and height lost in the median of those that survived.
 """
