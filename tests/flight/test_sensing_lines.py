@@ -53,6 +53,16 @@ def test_a_flight_through_heights_out_of_reach_is_told_for_how_long() -> None:
     assert "the reference is 1.5 to 5.5 m above it, for 50 % of the flight" in line
 
 
+def test_a_flight_that_begins_in_motion_unknown_to_the_filter_is_told() -> None:
+    moving = LOW | {"start.velocity": [9.0, 0.0, 0.0]}
+    [line] = said(**moving)
+    assert "0 to within 0.1 m/s" in line
+    assert "starts at 9 m/s; try --set estimator.kind=eskf --set estimator.start_speed=9" in line
+    assert said(**moving, **{"estimator": {"kind": "eskf", "start_speed": 9.0}}) == []
+    assert said(**moving, sensors="gps-consumer") == []
+    assert said(**LOW, **{"start.velocity": [0.2, 0.0, 0.0]}) == []
+
+
 def test_fly_fly_many_and_check_tell_it() -> None:
     settings = {"sensors": "crazyflie", "duration": 0.01, "fault": []}
     with pytest.warns(rf.SensorWarning, match="flow and range read the ground"):

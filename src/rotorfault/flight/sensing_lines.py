@@ -1,11 +1,13 @@
-"""What sensors that look at the ground do not read of a flight: flow and range have a nearest and a farthest."""
+"""What sensors do not read of a flight: ground out of reach, and the velocity of a flight that begins in motion."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
+from rotorfault.autopilot.estimation import ESTIMATOR
 from rotorfault.flight.reference_rows import heights_of
 from rotorfault.model.block import Context
 from rotorfault.plant import SENSORS
@@ -15,11 +17,12 @@ from rotorfault.plant.sensor_sets import SensorSet
 from rotorfault.reference import REFERENCE
 from rotorfault.scenario.scenario import Scenario
 
+MOST_OFF = 3.0  # standard deviations by which a first velocity may be off
 SHARE = 0.05  # of the flight out of reach that is told: a landing, or a short way through, is bridged
 
 
 def sensing_lines(scenario: Scenario) -> Iterator[str]:
-    """A line where start or reference lie where the ground is not read, with what would mend it.
+    """A line for each thing that sensors do not read and the estimator believes to know, with what would mend it.
 
     Parameters
     ----------
@@ -28,6 +31,7 @@ def sensing_lines(scenario: Scenario) -> Iterator[str]:
     sensors = scenario[SENSORS].make()
     if not isinstance(sensors, SensorSet):
         return
+    yield from _first_velocity(scenario, sensors)
     finder = next((one for one in sensors.made.values() if isinstance(one, RangeFinder)), None)
     if finder is None:
         return
@@ -58,6 +62,21 @@ def sensing_lines(scenario: Scenario) -> Iterator[str]:
         f"sensors {scenario[SENSORS].kind}: flow and range read the ground (at {ground:g} m) from {LOWEST:g} to "
         f"{farthest:g} m, but {' and '.join(told)}; there height and way are guessed from the accelerometer and "
         f"drift by metres; try {mend}"
+    )
+
+
+def _first_velocity(scenario: Scenario, sensors: SensorSet) -> Iterator[str]:
+    """A line where a flight begins in motion and nothing tells the filter so."""
+    estimator = scenario[ESTIMATOR]
+    known = getattr(estimator.make().settings, "start_speed", None)
+    speed = math.hypot(*scenario.start.velocity)
+    measured = any(getattr(one, "velocity", False) for one in sensors.made.values())
+    if known is None or measured or speed <= MOST_OFF * known:
+        return
+    yield (
+        f"estimator {estimator.kind}: sensors {scenario[SENSORS].kind} measure no velocity, so the first is taken "
+        f"to be 0 to within {known:g} m/s (standard deviation), but the flight starts at {speed:.3g} m/s; "
+        f"try --set estimator.kind={estimator.kind} --set estimator.start_speed={float(f'{speed:.1g}'):g}"
     )
 
 
