@@ -159,7 +159,8 @@ def after(flights: int) -> dict[str, Any]:
         f"{name}, {sensors}, {estimator}": flown(
             "hover-fault",
             COMMON
-            | {"sensors": sensors, "estimator": estimator, "fault": [fault], "vehicle.air.rotor_drag": drag}
+            | {"sensors": sensors, "estimator": estimator, "fault": [fault]}
+            | {"vehicle.linear_drag.value": 0.0, "vehicle.air.rotor_drag": drag}
             | {"start.position": [0.0, 0.0, 10.0], "reference.position": [0.0, 0.0, 10.0]},
             flights,
         )
@@ -181,7 +182,7 @@ def spinning(vehicle: str, preset: str, factor: float) -> dict[str, Any]:
         settings["vehicle.air.damping_yaw.value"] = factor * given.damping_yaw.value
     else:
         drag = {"value": factor * 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}
-        settings["vehicle.air.rotor_drag"] = drag
+        settings |= {"vehicle.linear_drag.value": 0.0, "vehicle.air.rotor_drag": drag}
     return settings
 
 

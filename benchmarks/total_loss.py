@@ -54,9 +54,12 @@ def settings(vehicle: str, dead: tuple[int, ...], law: str) -> dict[str, Any]:
     air = {
         f"vehicle.air.{key}": dict(zip(("value", "unit", "source"), it, strict=True)) for key, it in case.air.items()
     }
+    # The drag of their files is that of the rotors, and must not act twice.
+    once = {"vehicle.linear_drag.value": 0.0} if "rotor_drag" in case.air else {}
     return {
         "vehicle": vehicle,
         **air,
+        **once,
         "controller": {"preset": case.preset, **LAWS[law]},
         "duration": 15.0,
         "start.position": [0.0, 0.0, 10.0],

@@ -43,6 +43,7 @@ def test_noise_and_gusts_are_not_taken_for_the_ground() -> None:
     """With the share that serves a body which holds its yaw, the descent is less even."""
     high = {"start.position": [0.0, 0.0, 8.0], "reference.position": [0.0, 0.0, 8.0]}
     slow: dict[str, Any] = {"vehicle": "hummingbird", "duration": 22.0, **high}
+    slow["vehicle.linear_drag.value"] = 0.0
     slow["vehicle.air.rotor_drag"] = {"value": 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}
     own, taken = (
         (flights({"kind": "land", "spin_contact_share": share}, **slow)["landing.speed"] - 0.5).abs().max()

@@ -16,10 +16,11 @@ def number(value: float, unit: str) -> dict[str, object]:
 
 
 # Damping that is printed for the vehicle or one like it, without which a spin has no end.
+ONCE = {"vehicle.linear_drag.value": 0.0}  # of their files it is that of the rotors
 DAMPING: dict[str, tuple[str, dict[str, Any]]] = {
     "mueller-2014": ("hummingbird", {"vehicle.air.damping_yaw": number(2.75e-3, "N m s")}),
-    "hummingbird": ("hummingbird", {"vehicle.air.rotor_drag": number(1.19e-4, "kg/rad")}),
-    "crazyflie-2.1": ("crazyflie", {"vehicle.air.rotor_drag": number(1.03e-6, "kg/rad")}),
+    "hummingbird": ("hummingbird", ONCE | {"vehicle.air.rotor_drag": number(1.19e-4, "kg/rad")}),
+    "crazyflie-2.1": ("crazyflie", ONCE | {"vehicle.air.rotor_drag": number(1.03e-6, "kg/rad")}),
     "paper": ("quiet", {"vehicle.air.damping_yaw": number(5e-3, "N m s")}),
 }
 

@@ -12,6 +12,7 @@ import pytest
 from rotorfault.base.config import parse_toml, validate
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.model.aerodynamics import still_air
 from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_check import LEAST, most_torque, vehicle_warnings
 from rotorfault.model.vehicle_file import VEHICLE_TEMPLATE, VehicleFile, load_vehicle, vehicle_names
@@ -166,3 +167,13 @@ def test_the_most_torque_leaves_the_thrust_and_the_other_axes(vehicle: Vehicle) 
     spare = min(hover.r1, vehicle.thrust_max - hover.r1)
     assert most_torque(vehicle, hover, Vec3(0.0, 0.0, 1.0)) == pytest.approx(4.0 * spare * vehicle.torque_ratio)
     assert most_torque(vehicle, PerRotor.all(1.01 * vehicle.thrust_max), Vec3(0.0, 0.0, 1.0)) == 0.0
+
+
+def test_a_drag_that_is_given_twice_is_doubted() -> None:
+    vehicle = load_vehicle("hummingbird").vehicle
+    twice = vehicle._replace(air=still_air()._replace(rotor_drag=1.19e-4))
+    [line] = vehicle_warnings(twice)
+    assert "linear_drag = 0.223 N s/m" in line
+    assert "set linear_drag = 0" in line
+    assert vehicle_warnings(twice._replace(linear_drag=0.0)) == []
+    assert vehicle_warnings(twice._replace(linear_drag=0.02)) == []  # the frame's

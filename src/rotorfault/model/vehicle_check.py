@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rotorfault.maths.geometry import PerRotor, Vec3, spread
+from rotorfault.model.aerodynamics import Aerodynamics
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
 from rotorfault.model.proportion import INERTIAS, LENGTHS, Proportion, times
 from rotorfault.model.signals import Wrench
@@ -33,6 +34,7 @@ LEAST = Vec3.of(4.0 * ANGLE / t**2 for t in TIMES)  # rad/s^2
 AXES = ("roll", "pitch", "yaw")
 SPARE = 0.2  # of hover's thrust: with less to spare up or down it is thrust that an axis lacks, not its lever
 BESIDE = 0.1  # of the arm: so far from the middle of the rotors a centre of mass takes a tenth of thrust from some
+ALIKE = 2.0  # share up to which two drags of one vehicle may be the same number by two sources
 FAR_AWAY = 0.5  # of the arm: from 0.7 on no four rotors of an X balance each other
 THRUST = 0.012 * 1.2 * math.pi  # kg/m^3: C_T rho pi
 
@@ -55,7 +57,20 @@ def vehicle_warnings(vehicle: Vehicle) -> list[str]:
     if any(line.startswith("centre_of_mass") for line in units):
         return units
     said = [axis for axis, key in zip(AXES, "xyz", strict=True) if any(f"inertia_{key} =" in line for line in units)]
-    return [*units, *(line for axis, line in _authority(vehicle) if axis not in said)]
+    return [*units, *_drag_twice(vehicle), *(line for axis, line in _authority(vehicle) if axis not in said)]
+
+
+def _drag_twice(vehicle: Vehicle) -> Iterator[str]:
+    """A line where the drag of the rotors is as large as the linear drag: most likely the same, given twice."""
+    if not isinstance(vehicle.air, Aerodynamics):
+        return
+    linear = vehicle.linear_drag
+    of_rotors = vehicle.air.rotor_drag * math.fsum(rotor_speeds(vehicle, hover_thrust(vehicle)))
+    if linear > 0.0 and linear / ALIKE < of_rotors < ALIKE * linear:
+        yield (
+            f"linear_drag = {linear:g} N s/m and that of the rotors, air.rotor_drag times their speeds in hover, "
+            f"{of_rotors:.3g}, are about the same and act both; if it is one drag given twice, set linear_drag = 0"
+        )
 
 
 def most_torque(vehicle: Vehicle, thrust: PerRotor, axis_B: Vec3) -> float:

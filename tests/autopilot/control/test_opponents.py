@@ -208,5 +208,5 @@ def test_a_law_that_is_told_nothing_flies_on_too(dead: tuple[int, ...]) -> None:
 @pytest.mark.parametrize("kind", ["indi", "ndi_primary_axis", "lqr_relaxed_hover"])
 def test_its_preset_for_total_losses_flies_slow_rotors(kind: str) -> None:
     drag = {"vehicle.air.rotor_drag": {"value": 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}}
-    slow = {"vehicle": "hummingbird", "controller.preset": "spin", **drag}
+    slow = {"vehicle": "hummingbird", "controller.preset": "spin", "vehicle.linear_drag.value": 0.0, **drag}
     assert lost(kind, (1,), **slow)["survived"].all()

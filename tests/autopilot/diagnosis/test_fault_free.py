@@ -64,7 +64,8 @@ def test_a_wrong_model_goes_no_further_than_one_can_be() -> None:
 def test_drag_at_the_rotors_blames_none_in_fast_flight() -> None:
     """Forward at 10 m/s in gusts, the centre of mass off by a fifth of the arm: 32 flags where drag takes thrust."""
     settings: dict[str, Any] = {
-        "duration": 3.0, "vehicle": "crazyflie-2.1", "vehicle.air.rotor_drag": OF_ROTORS,
+        "duration": 3.0, "vehicle": "crazyflie-2.1", "vehicle.linear_drag.value": 0.0,
+        "vehicle.air.rotor_drag": OF_ROTORS,
         "sensors": "mocap", "estimator": "eskf", "diagnosis": "multiple_model", "controller.preset": "gentle",
         "reference": {"kind": "sinusoid", "amplitude": [250.0, 0.0, 0.0], "frequency": [0.04, 1.0, 1.0],
                       "phase": [-0.4, 0.0, 0.0], "offset": [97.354586, 0.0, 0.0]},
