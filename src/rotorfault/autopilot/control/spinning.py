@@ -30,6 +30,9 @@ FASTEST = 10.0
 # Command filter over the position loop's crossover, at least: a double pole there costs 25 degrees of phase. Our
 # choice: a critically damped loop has 67 degrees without it, and the axis of a body that spins takes its share too.
 FILTER_AHEAD = 4.5
+# Of the rotors' bandwidth, at most: a faster command asks the tilt loop for more than rotors that lag can follow, and
+# costs height. Our choice: half of it, 27 degrees of their phase.
+FOLLOWS = 0.5
 
 
 @final
@@ -96,8 +99,8 @@ class Spinning:
     def filter_bandwidth(self, bandwidth: Scalar, outer: LawOutput) -> Scalar:
         r"""Double pole of the command filter in rad/s: as far as yaw is free, fast enough for the position loop.
 
-        The loop :math:`(k_2s + k_1)/s^2` crosses at :math:`\sqrt{k_1 + k_2^2}` at most. A body that holds yaw keeps
-        the filter that it was given.
+        The loop :math:`(k_2s + k_1)/s^2` crosses at :math:`\sqrt{k_1 + k_2^2}` at most. It is no faster than half of
+        the rotors' bandwidth, and a body that holds yaw keeps the filter that it was given.
 
         Parameters
         ----------
@@ -108,7 +111,8 @@ class Spinning:
         """
         k1, k2 = outer.gain_e, outer.gain_rate
         crosses = sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))
-        return bandwidth + maximum(FILTER_AHEAD * crosses - bandwidth, 0.0) * (self.axis.free * self._points)
+        wanted = minimum(FILTER_AHEAD * crosses, FOLLOWS * mean_bandwidth(self.inputs.vehicle))
+        return bandwidth + maximum(wanted - bandwidth, 0.0) * (self.axis.free * self._points)
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
