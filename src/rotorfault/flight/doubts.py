@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from rotorfault.analysis.hover import critical_loss, hover_margin
 from rotorfault.analysis.sampling_check import sampled_data_warnings
+from rotorfault.autopilot.allocation import ALLOCATION
+from rotorfault.autopilot.allocation.dither import free_directions
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.presets import presets, record
 from rotorfault.base.errors import (
@@ -74,7 +76,7 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
     varied : bool
         Whether many flights differ in what the scenario holds: then faults, reference and wind are as they are meant.
     """
-    found = [Doubt(VehicleWarning, line) for line in vehicle_lines(scenario)]
+    found = [Doubt(VehicleWarning, line) for line in (*vehicle_lines(scenario), *_nothing_free(scenario))]
     if not varied:
         found += [Doubt(StartWarning, line) for line in _inverted(scenario)]
         found += [Doubt(FaultWarning, line) for line in (*_late(scenario), *_unattainable(scenario))]
@@ -85,6 +87,17 @@ def doubts(scenario: Scenario, own_controller: bool = False, varied: bool = Fals
         found += [Doubt(WindWarning, line) for line in wind_lines(scenario)]
         found += [Doubt(SensorWarning, line) for line in sensing_lines(scenario)]
     return found
+
+
+def _nothing_free(scenario: Scenario) -> Iterator[str]:
+    """A line where thrusts are to move that the vehicle has not got to spare."""
+    vehicle = scenario.vehicle.vehicle
+    if scenario[ALLOCATION].kind == "dither" and not free_directions(vehicle).shape[1]:
+        yield (
+            f"allocation 'dither': the {vehicle.rotors} rotors of '{scenario.vehicle.name}' leave no thrusts free, "
+            "so nothing is moved and it is 'effectiveness'; vehicles with more rotors than forces and torques, as "
+            "octa-x, have some"
+        )
 
 
 def rattling(scores: Mapping[str, Any], controller: str) -> Doubt | None:

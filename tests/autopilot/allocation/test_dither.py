@@ -111,10 +111,12 @@ def test_its_size_follows_from_noise_and_time() -> None:
 def test_four_rotors_have_nothing_free() -> None:
     assert free_directions(numbers_of_vehicle("x500")).shape == (4, 0)
     assert free_directions(numbers_of_vehicle("octa-x")).shape == (8, 4)
-    with pytest.raises(
-        rf.InputError, match="4 rotors, which leave no thrusts free; allowed: vehicles with more rotors"
-    ):
-        Dither().parameters(at("x500"))
+    assert Dither().parameters(at("x500")).even == ()
+    quad = {"vehicle": "x500", "allocation": "dither", "controller.preset": "midsize", "duration": 0.02, "fault": []}
+    with pytest.warns(rf.VehicleWarning, match="the 4 rotors of 'x500' leave no thrusts free"):
+        flown = rf.fly("hover-fault", settings=quad)
+    plain = rf.fly("hover-fault", settings=quad | {"allocation": "effectiveness"})
+    np.testing.assert_array_equal(flown.data["thrust_command"].values, plain.data["thrust_command"].values)
 
 
 @needs_simd

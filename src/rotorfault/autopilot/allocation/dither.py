@@ -39,7 +39,6 @@ from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
 from rotorfault.autopilot.diagnosis.fault_free import model_parameters
 from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.base.config import Strict
-from rotorfault.base.errors import InputError
 from rotorfault.maths.arrays import Array
 from rotorfault.maths.geometry import PerRotor, per_rotor
 from rotorfault.maths.scalar import Scalar, greater, less, maximum, minimum, select
@@ -95,20 +94,11 @@ class Dither(Allocator[DitherMemory, DitherParameters]):
     Settings = DitherSettings
 
     def parameters(self, context: Context) -> DitherParameters:
-        """Directions of the null space, each as large as the sensors want it.
-
-        Raises
-        ------
-        InputError
-            If the rotors leave nothing free.
-        """
+        """Directions of the null space, each as large as the sensors want it; none where nothing is free."""
         vehicle, s = context.vehicle, self.settings
         basis = free_directions(vehicle)
         if not basis.shape[1]:
-            raise InputError(
-                f"allocation 'dither' with {vehicle.rotors} rotors, which leave no thrusts free; allowed: vehicles "
-                "with more rotors than forces and torques, such as octa-x; or take the allocation 'effectiveness'"
-            )
+            return DitherParameters(s.effectiveness_min, (), (), ())
         pairs = -(-basis.shape[1] // 2)
         basis = np.pad(basis, ((0, 0), (0, 2 * pairs - basis.shape[1])))
         w = float(mean_bandwidth(vehicle))
