@@ -273,10 +273,12 @@ def advance(
             **({LEVERS + axis: lever[axis] * dt} if axis < 2 else yawed),
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
-        # Of what turns the body in all, a wrong inertia is wrong by a share; the learned lag is in the model already.
+        # Of what the rotors turn the body by, a wrong inertia is wrong by a share; offsets and levers are learned as the
+        # accelerations that they are. The learned lag is in the model already.
         learned = row[BANDWIDTH] * mean[BANDWIDTH] - less_thrust * getattr(shifted, name)  # the latter stands twice
         moved = getattr(change, name)
-        whole = moved + dot(row, mean) - learned
+        of_losses = {LOSSES + i: row[LOSSES + i] for i in range(vehicle.rotors)}
+        whole = moved + dot(of_losses, mean) + less_thrust * getattr(shifted, name)
         share = 1.0 / (1.0 + mean[INERTIA + axis])
         row[INERTIA + axis] = -whole * share * share
         known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
