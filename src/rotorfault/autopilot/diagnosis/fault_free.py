@@ -9,8 +9,9 @@ spread of its own at the start. Angular acceleration and specific force along bo
 
 with :math:`\alpha` and T of the believed model with sound rotors, and
 
-- d, torque over inertia of a shifted centre of mass and of unlike drag torques;
-- :math:`e_J`, by which share each moment of inertia is larger than believed, :math:`\varphi_J = -\dot\omega`, and
+- d, angular acceleration by a shifted centre of mass and by unlike drag torques: what is to be seen of them, whatever
+  the inertia, so that no product of two unknowns is left;
+- :math:`e_J`, by which share each moment of inertia is larger than believed, :math:`\varphi_J = -\alpha`, and
   :math:`e_w`, the rotors' bandwidth, :math:`\varphi_w = J^{-1}\tau(s)` with the sensitivities s of
   `rotorfault.autopilot.diagnosis.model_error`: constants, which a flight that turns the body teaches;
 - l, the levers about roll and pitch at which lateral forces of the air act: drag above the centre of mass, and
@@ -273,8 +274,8 @@ def advance(
             **({LEVERS + axis: lever[axis] * dt} if axis < 2 else yawed),
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
-        # Of what the rotors turn the body by, a wrong inertia is wrong by a share; offsets and levers are learned as the
-        # accelerations that they are. The learned lag is in the model already.
+        # Of what the rotors turn the body by, a wrong inertia is wrong by a share; offsets and levers are learned as
+        # the accelerations that they are. The learned lag is in the model already.
         learned = row[BANDWIDTH] * mean[BANDWIDTH] - less_thrust * getattr(shifted, name)  # the latter stands twice
         moved = getattr(change, name)
         of_losses = {LOSSES + i: row[LOSSES + i] for i in range(vehicle.rotors)}
