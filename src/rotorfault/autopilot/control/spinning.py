@@ -94,7 +94,9 @@ class Spinning:
         # Where yaw is not even braked there is nothing to spare thrust for: all that balances stops a fall, as far as
         # the axis points up. Elsewhere it pushes away, and leaves rotors at their limits no torque to turn there.
         falling = (most + (self.axis.thrust - most) * self._points) * self.axis.free
-        return maximum(inputs.thrust_available, maximum(most * self.axis.given_up, falling))
+        # The share that is held back for torque must not sink a body that has just its weight.
+        carried = minimum(self.axis.thrust, weight) * (self.axis.free / share)
+        return maximum(inputs.thrust_available, maximum(maximum(most * self.axis.given_up, falling), carried))
 
     def filter_bandwidth(self, bandwidth: Scalar, outer: LawOutput) -> Scalar:
         r"""Double pole of the command filter in rad/s: as far as yaw is free, fast enough for the position loop.
