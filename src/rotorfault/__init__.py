@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
     from rotorfault.autopilot.control.protocol import ControlInputs, Controller, ControlOutput
     from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
+    from rotorfault.autopilot.estimation.imu_filter import FilterInputs, ImuFilter
     from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs
     from rotorfault.autopilot.instant import Decision
     from rotorfault.autopilot.response.protocol import Response, ResponseInputs
@@ -116,11 +117,13 @@ _HOME = {
     "EstimatorInputs": "autopilot.estimation.protocol",
     "Fault": "plant.faults",
     "FaultWarning": "base.errors",
+    "FilterInputs": "autopilot.estimation.imu_filter",
     "Flight": "flight.flight",
     "Flights": "flight.many",
     "Flow": "model.signals",
     "Frame": "model.frames",
     "Ground": "plant.ground",
+    "ImuFilter": "autopilot.estimation.imu_filter",
     "InputError": "base.errors",
     "LogDiagnosis": "logs.verdict",
     "Mat3": "maths.geometry",
@@ -219,11 +222,13 @@ __all__ = [
     "EstimatorInputs",
     "Fault",
     "FaultWarning",
+    "FilterInputs",
     "Flight",
     "Flights",
     "Flow",
     "Frame",
     "Ground",
+    "ImuFilter",
     "InputError",
     "LogDiagnosis",
     "Mat3",

@@ -284,7 +284,10 @@ def test_structure_is_one_word_per_part() -> None:
     faults = [{"kind": "total", "rotor": rotor, "time": 0.1} for rotor in (2, 4)]
     *parts, _, substeps, supply, floats = structure(assemble(short(fault=faults)).loop)
     slots = [word.partition(":")[0] for word in parts]
-    truth, belief = ["wind", "fault", "fault", "plant", "sensors"], ["estimator", "diagnosis", "on_fault"]
+    truth, belief = (
+        ["wind", "fault", "fault", "plant", "sensors"],
+        ["imu_filter", "estimator", "diagnosis", "on_fault"],
+    )
     assert slots == [*truth, *belief, "controller", "allocation"]
     assert "RigidBody" in parts[slots.index("plant")]
     assert supply == "battery False, compensated False"

@@ -117,7 +117,13 @@ def test_an_end_between_two_records_far_apart_is_recorded(engine: str) -> None:
     """The engine flies on until the record, though nothing else is left to fly for."""
     fault = {"kind": "step", "rotor": 2, "time": 0.02, "loss": 1.0}
     batch = assemble(
-        short(duration=0.005 * 3 * CHUNK, record_period=0.005 * (CHUNK + 3), fault=[fault], plant="paper_model")
+        short(
+            duration=0.005 * 3 * CHUNK,
+            record_period=0.005 * (CHUNK + 3),
+            fault=[fault],
+            plant="paper_model",
+            diagnosis="off",
+        )
     )
     found = run(batch, engine)
     assert 0 < found.state[leaf_names(batch.state).index("scores.end"), 0] < CHUNK

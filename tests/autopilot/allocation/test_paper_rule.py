@@ -20,6 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rotorfault.autopilot.allocation import ALLOCATION, Effectiveness, Nominal, PaperRule, Sequential
+from rotorfault.autopilot.allocation.dither import Dither
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.records import flatten
 from rotorfault.model.signals import Wrench, healthy
@@ -120,8 +121,11 @@ def test_engines_agree(name: str, engine: Callable[..., Array]) -> None:
     np.testing.assert_allclose(engine(step(name), rows), floats, rtol=0, atol=1e-12)
 
 
-def test_registry_has_the_four() -> None:
+def test_registry_has_the_five() -> None:
     registry = ALLOCATION.registry
-    kinds = {"effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule, "sequential": Sequential}
+    kinds = {
+        "dither": Dither, "effectiveness": Effectiveness, "nominal": Nominal, "paper_rule": PaperRule,
+        "sequential": Sequential,
+    }  # fmt: skip
     assert dict(registry.items()) == kinds
     assert all(registry.summary(name) for name in registry)

@@ -78,6 +78,7 @@ class DitherParameters(NamedTuple):
     even: tuple[PerRotor, ...]  # N: command along the cosine of each pair
     odd: tuple[PerRotor, ...]  # N: along the sine; 0 where there is none
     turn: tuple[tuple[Scalar, Scalar], ...]  # cosine and sine of the angle by which each pair turns in a period
+    asked: tuple[Scalar, ...]  # of the settings: loss, s, deviations, m/s, share; what the sizes follow from
 
 
 class DitherMemory(NamedTuple):
@@ -96,9 +97,10 @@ class Dither(Allocator[DitherMemory, DitherParameters]):
     def parameters(self, context: Context) -> DitherParameters:
         """Directions of the null space, each as large as the sensors want it; none where nothing is free."""
         vehicle, s = context.vehicle, self.settings
+        asked = (s.loss, s.time, s.deviations, s.wind, s.most)
         basis = free_directions(vehicle)
         if not basis.shape[1]:
-            return DitherParameters(s.effectiveness_min, (), (), ())
+            return DitherParameters(s.effectiveness_min, (), (), (), asked)
         pairs = -(-basis.shape[1] // 2)
         basis = np.pad(basis, ((0, 0), (0, 2 * pairs - basis.shape[1])))
         w = float(mean_bandwidth(vehicle))
@@ -112,7 +114,7 @@ class Dither(Allocator[DitherMemory, DitherParameters]):
             even.append(PerRotor.of(float(x) for x in basis[:, 2 * k] * command))
             odd.append(PerRotor.of(float(x) for x in basis[:, 2 * k + 1] * command))
         turn = tuple((math.cos(f * context.period), math.sin(f * context.period)) for f in frequencies)
-        return DitherParameters(s.effectiveness_min, tuple(even), tuple(odd), turn)
+        return DitherParameters(s.effectiveness_min, tuple(even), tuple(odd), turn, asked)
 
     def initial(self, inputs: AllocationInputs, parameters: DitherParameters) -> DitherMemory:
         """All pairs begin at no cosine, so that nothing jumps where there is no sine."""
