@@ -16,7 +16,7 @@ import argparse
 
 import numpy as np
 
-from rotorfault.analysis.isolation import SETTLED, _shown, hover
+from rotorfault.analysis.isolation import SETTLED, after_a_period, errors_after, hover
 from rotorfault.analysis.vehicle_settings import numbers_of_vehicle
 from rotorfault.autopilot.diagnosis.glr import Glr, GlrSettings
 from rotorfault.model.block import Context
@@ -43,24 +43,18 @@ def bound(vehicle: str, loss: float, time: float) -> tuple[float, float, float]:
     steps, windows = round(time / PERIOD), round(2.0 / PERIOD)
     slope, sums = np.zeros(rotors), {name: np.zeros((2, rotors)) for name in ("constant", "late")}
     for k in range(1, round(SETTLED / PERIOD) + steps + 1):
-        P = model.phi @ P @ model.phi.T + np.diag(model.noise)
-        variance, gain = np.zeros(len(model.seen)), np.zeros(model.seen.shape)
-        for m, row in enumerate(model.seen):
-            reach = P @ row
-            variance[m] = row @ reach + model.measured[m]
-            gain[m] = reach / variance[m]
-            P = P - np.outer(gain[m], reach)
+        P, variance, gain = after_a_period(P, model)
         since = k - round(SETTLED / PERIOD)
         if since <= 0:
             continue
         share = since / steps
         grown = model._replace(torque=model.torque * share, force=model.force * share)
-        ramp, shown = _shown(ramp, grown, gain)
+        ramp, shown = errors_after(ramp, grown, gain)
         slope += (shown * shown / variance).sum(axis=1)
-        constant, own = _shown(constant, model, gain)
+        constant, own = errors_after(constant, model, gain)
         sums["constant"] += np.array([(own * shown / variance).sum(axis=1), (own * own / variance).sum(axis=1)])
         if since > steps - windows:
-            late, own = _shown(late, model, gain)
+            late, own = errors_after(late, model, gain)
             sums["late"] += np.array([(own * shown / variance).sum(axis=1), (own * own / variance).sum(axis=1)])
     found = [loss * np.sqrt(slope)]
     found += [(loss * d / np.maximum(C, 1e-12) - least) * np.sqrt(C) for d, C in sums.values()]

@@ -197,21 +197,54 @@ def _instants(model: Hover, dt: float) -> Iterator[Shown]:
     settling = round(SETTLED / dt)
     k = 0
     while True:
-        P = model.phi @ P @ model.phi.T + np.diag(model.noise)
-        variance, gain = np.zeros(len(model.seen)), np.zeros(model.seen.shape)
-        for m, row in enumerate(model.seen):
-            reach = P @ row
-            variance[m] = row @ reach + model.measured[m]
-            gain[m] = reach / variance[m]
-            P = P - np.outer(gain[m], reach)
+        P, variance, gain = after_a_period(P, model)
         k += 1
         if k > settling:
-            error, own = _shown(error, model, gain)
+            error, own = errors_after(error, model, gain)
             yield Shown(variance, gain, model, own)
 
 
-def _shown(error: Array, model: Hover, gain: Array) -> tuple[Array, Array]:
-    """Errors by a whole loss of each rotor an instant later, shape (..., rotors, n), and what innovations show."""
+def after_a_period(P: Array, model: Hover) -> tuple[Array, Array, Array]:
+    """Covariance of the filter a period later, with variances of the innovations and gains of their numbers.
+
+    Parameters
+    ----------
+    P : (n, n) ndarray
+        Covariance before.
+    model : Hover
+
+    Returns
+    -------
+    P : (n, n) ndarray
+    variance : (6,) ndarray
+    gain : (6, n) ndarray
+    """
+    P = model.phi @ P @ model.phi.T + np.diag(model.noise)
+    variance, gain = np.zeros(len(model.seen)), np.zeros(model.seen.shape)
+    for m, row in enumerate(model.seen):
+        reach = P @ row
+        variance[m] = row @ reach + model.measured[m]
+        gain[m] = reach / variance[m]
+        P = P - np.outer(gain[m], reach)
+    return P, variance, gain
+
+
+def errors_after(error: Array, model: Hover, gain: Array) -> tuple[Array, Array]:
+    """Errors by a whole loss of each rotor an instant later, and what innovations show of them.
+
+    Parameters
+    ----------
+    error : (..., rotors, n) ndarray
+        Errors of the filter's states before.
+    model : Hover
+    gain : (6, n) ndarray
+
+    Returns
+    -------
+    error : (..., rotors, n) ndarray
+    own : (..., rotors, 6) ndarray
+        Means of the innovations.
+    """
     error = error @ model.phi.T + model.torque
     own = np.zeros((*error.shape[:-1], len(gain)))
     for m, row in enumerate(model.seen):
@@ -257,7 +290,7 @@ class Watched:
             younger = np.concatenate([np.zeros_like(values[:1]), values[:-1]])
             values[over] = younger[over]
         self.age = self.age + dt
-        self.error, own = _shown(self.error, shown.model, shown.gain)
+        self.error, own = errors_after(self.error, shown.model, shown.gain)
         weighed = own / shown.variance
         self.score = self.score + weighed @ innovations.T
         self.information = self.information + (own * weighed).sum(axis=-1)
