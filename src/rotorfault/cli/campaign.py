@@ -96,7 +96,9 @@ def campaign(
         if out is None:
             raise InputError("--report-only needs the folder of a campaign; give it with --out")
         if study is not None or resume or repair or not report or settings:
-            raise InputError("--report-only makes the report of what is in --out and flies nothing; give it alone")
+            raise InputError(
+                "--report-only flies nothing, it makes the report of what is in --out; give it alone with --out"
+            )
         # A controller of the campaign may be named again, and so allowed.
         there = Campaign(out, allow_code=allow_code or controllers or False)
         _keep(there, keep_flights)

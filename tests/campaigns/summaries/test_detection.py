@@ -19,6 +19,7 @@ from rotorfault.campaigns.axes import BEYOND, columns
 from rotorfault.campaigns.load import load_study
 from rotorfault.campaigns.study import study_from
 from rotorfault.campaigns.summaries.detection import detection, garwood
+from rotorfault.campaigns.summaries.parts import Curves
 
 KEYS = {
     "vehicle",
@@ -188,6 +189,24 @@ def test_a_loss_that_comes_and_goes_takes_the_place_of_the_one_that_lasts() -> N
 def test_a_loss_cannot_come_and_go_without_a_rotor() -> None:
     with pytest.raises(rotorfault.InputError, match="'flicker' needs 'onset' and a rotor"):
         columns({"loss": np.array([0.2]), "flicker": np.array([0.5]), "onset": np.array([1.0])})
+
+
+@needs_simd
+def test_each_detector_is_drawn_by_how_soon_it_names_the_right_rotor(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet")
+    summary = detection(study_from(DETECTION, "study"), table.to_arrow())
+    figure = next(one for one in summary.figures if one.name == "detectors")
+    assert isinstance(figure, Curves)
+    assert set(figure.lines) == {"as it is", "eager"}
+    for variant, (times, share, low, high) in figure.lines.items():
+        mine = table.filter(pl.col("variant") == variant, pl.col("loss") > 0.0)
+        named = mine.filter(pl.col("grade").is_in(["right rotor", "others too"]))
+        soon = [(named["delay"] <= 1e-3 * time).sum() / mine.height for time in times]
+        assert share == pytest.approx(soon)
+        assert (low <= share).all()
+        assert (share <= high).all()
+    # Of two the one with the lower threshold is sooner somewhere, so that the lines are not one.
+    assert (figure.lines["as it is"][1] != figure.lines["eager"][1]).any()
 
 
 @needs_simd

@@ -16,6 +16,8 @@ from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLUE, ORANGE, SKY, shown, unit
 
 MOST_TICKS = 9
+BESIDE = 14  # letters of a name that has others beside it
+BELOW = 28  # letters of one that has others below it
 MOST_STEP = 0.2  # of an axis, between cells that may be joined by a line
 WIDTH_MM, MM_PER_LETTER, MM_PER_HANDLE = 160.0, 1.5, 13.0  # of a legend, as its letters are
 # From sand (all failed) to blue (all successful), ever darker, so also in grey: lines in black and vermilion are seen
@@ -49,7 +51,7 @@ def label(view: View) -> str:
     return f"{shown(view.title, 40)} ({unit(view.unit)})" if view.unit else shown(view.title, 40)
 
 
-def ticks(view: View, most: int = MOST_TICKS) -> tuple[Array, list[str]]:
+def ticks(view: View, most: int = MOST_TICKS, letters: int = BESIDE) -> tuple[Array, list[str]]:
     """Places and texts of ticks: round numbers between the outermost values, or values of cells."""
     at = places(view)
     if view.even and len(view.values) > 1:
@@ -58,7 +60,7 @@ def ticks(view: View, most: int = MOST_TICKS) -> tuple[Array, list[str]]:
         values = values[(values >= at[0] - slack) & (values <= at[-1] + slack)]
         return values, [f"{value:.10g}".replace("-", "−") for value in values]
     chosen = range(0, len(view.values), -(-len(view.values) // most))
-    return np.array([at[i] for i in chosen]), [shown(view.text(i), 14) for i in chosen]
+    return np.array([at[i] for i in chosen]), [shown(view.text(i), letters) for i in chosen]
 
 
 def scale_x(axes: Axes, view: View, most: int = MOST_TICKS) -> None:
@@ -70,7 +72,7 @@ def scale_x(axes: Axes, view: View, most: int = MOST_TICKS) -> None:
 
 def scale_y(axes: Axes, view: View) -> None:
     """Limits and ticks of a vertical axis."""
-    edges, (at, texts) = borders(view), ticks(view)
+    edges, (at, texts) = borders(view), ticks(view, letters=BELOW)
     axes.set_ylim(edges[0], edges[-1])
     axes.set_yticks(at, texts)
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from rotorfault.campaigns.grading import GRADINGS
 from rotorfault.campaigns.report.answer import signed
 from rotorfault.campaigns.report.axis_drawing import (
+    BELOW,
+    BESIDE,
     DIFFERENCE_COLOURS,
     SUCCESS_COLOURS,
     borders,
@@ -359,8 +361,12 @@ def _nullable(values: Array) -> list[Any]:
 
 
 def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | None = None) -> Spec:
-    axes = [_axis(view) for view in views]
-    if len(axes) == 1:
+    axes = [_axis(view, letters) for view, letters in zip(views, (BESIDE, BELOW), strict=False)]
+    if len(axes) == 2:
+        # Names of cases can be long: they get lines of their own, and the room that they need.
+        lines = [text.replace(", ", ",<br>") for text in axes[1]["ticktext"]]
+        axes[1] |= {"automargin": True, "ticktext": lines}
+    else:
         axes.append({"title": {"text": title}, "range": list(ends or (0.0, 1.0)), "zeroline": False})
     return {
         "xaxis": axes[0],
@@ -383,11 +389,11 @@ def _as_text(text: str) -> str:
     return html.escape(text, quote=False)
 
 
-def _axis(view: View) -> Spec:
+def _axis(view: View, letters: int) -> Spec:
     edges = borders(view)
     axis: Spec = {
         "title": {"text": _as_text(label(view))}, "zeroline": False, "showgrid": False, "ticks": "outside",
         "range": [float(edges[0]), float(edges[-1])],
     }  # fmt: skip
-    at, texts = ticks(view)
+    at, texts = ticks(view, letters=letters)
     return axis | {"tickmode": "array", "tickvals": at.tolist(), "ticktext": [_as_text(text) for text in texts]}

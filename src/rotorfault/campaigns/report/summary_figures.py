@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from rotorfault.campaigns.report.axis_drawing import colours
 from rotorfault.campaigns.report.line_figure import look
 from rotorfault.campaigns.summaries.parts import Curves, Rates, Shares, Summary
-from rotorfault.report.style import STYLE, new_figure, shown
+from rotorfault.report.style import GREY, STYLE, new_figure, shown
 
 ROW_HIGH = 0.52  # cm
 MOST_LABEL = 26  # characters
@@ -80,11 +81,17 @@ def _lines(one: Curves) -> Figure:
             x, y, [np.maximum(y - lower, 0.0), np.maximum(upper - y, 0.0)], marker="o", markersize=3.0, capsize=2.0,
             elinewidth=0.7, label=shown(label, MOST_LABEL), **style,
         )  # fmt: skip
+    if one.ideal is not None:
+        label, ideal = one.ideal
+        axes.plot(ideal, ideal, "--", color=GREY, linewidth=0.9, zorder=1.0, label=label)
+    axes.set_title(one.title)
     axes.set_xlabel(one.x_title)
     axes.set_ylabel(one.y_title)
-    axes.set_ylim(-0.03, 1.03)
+    # Shares have a scale of their own; what is compared with an ideal has that of the ideal.
+    axes.set_ylim(-0.03, 1.03 if one.ideal is None else 1.15 * float(one.ideal[1].max()))
     if one.x_log and min(float(x.min()) for x, *_ in one.lines.values()) > 0.0:
         axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
     elif one.x_log:
         axes.set_xscale("symlog", linthresh=LEAST_RATE)
         axes.set_xlim(left=-0.2 * LEAST_RATE)

@@ -55,6 +55,7 @@ def figures(flights: Flights, of_first: Column, content: Row) -> tuple[Shares | 
     return (
         *(_by_manoeuvre(flights, chosen) if chosen.size else ()),
         *((_delays(flights, chosen),) if chosen.size else ()),
+        *_detectors(flights),
         *_errors(flights, chosen),
         *_confusions(content["isolation"], flights, of_first),
         *_rates(content),
@@ -160,16 +161,33 @@ def _by_manoeuvre(flights: Flights, chosen: Which) -> list[Shares]:
 
 def _delays(flights: Flights, chosen: Which) -> Curves:
     """Share of faults whose rotor is named by a time, a line for each fault."""
+    keys = [flights.kind[k].fault for k in chosen]
+    title = f"how soon the right rotor is named, {flights.kind[chosen[0]].variant}"
+    return _named_by(
+        flights, "delays", title, {key: chosen[part] for (key,), part in grouped([(k,) for k in keys]).items()}
+    )
+
+
+def _detectors(flights: Flights) -> list[Curves]:
+    """The same of each detector, on the same faults."""
+    faulty = np.flatnonzero(flights.loss > 0.0)
+    parts = {name: faulty[part] for (name,), part in grouped([(flights.kind[k].variant,) for k in faulty]).items()}
+    if len(parts) < 2:
+        return []
+    return [_named_by(flights, "detectors", "how soon each detector names the right rotor, all faults", parts)]
+
+
+def _named_by(flights: Flights, name: str, title: str, parts: dict[str, Which]) -> Curves:
+    """Share of flights whose rotor is named by a time, a line for each part of them."""
     lines = {}
     points = np.array(DELAYS, dtype=float)
-    for (fault,), part in grouped([(flights.kind[k].fault,) for k in chosen]).items():
-        which = chosen[part]
+    for label, which in parts.items():
         right = np.isin(flights.columns["grade"][which], NAMED)
         delay = np.where(right, flights.columns["delay"][which].astype(float), np.inf)
         counts = [int((delay <= 1e-3 * point).sum()) for point in points]
         ends = np.array([counted(count, int(which.size), flights.level) for count in counts])
-        lines[fault] = (points, np.array(counts) / which.size, ends[:, 0], ends[:, 1])
-    return Curves("delays", "time since the onset (ms)", "share of right rotors by then (–)", lines, True)
+        lines[label] = (points, np.array(counts) / which.size, ends[:, 0], ends[:, 1])
+    return Curves(name, title, "time since the onset (ms)", "share of right rotors by then (–)", lines, True)
 
 
 def _errors(flights: Flights, chosen: Which) -> list[Curves]:
@@ -190,8 +208,9 @@ def _errors(flights: Flights, chosen: Which) -> list[Curves]:
     if not lines:
         return []
     true = np.unique(np.concatenate([losses for losses, *_ in lines.values()]))
-    lines["if it were right"] = (true, true, true, true)
-    return [Curves("loss-error", "true loss (–)", "believed 0.15 s after the onset (–)", lines, False)]
+    title = f"believed over true loss, {flights.kind[chosen[0]].variant}: median, and where 90 % are"
+    ends_of = ("true loss (–)", "believed 0.15 s after the onset (–)")
+    return [Curves("loss-error", title, *ends_of, lines, False, ("if it were right", np.append(0.0, true)))]
 
 
 def _confusions(rows: list[Row], flights: Flights, of_first: Column) -> list[Shares]:
@@ -239,4 +258,7 @@ def _roc(roc: list[Row]) -> list[Curves]:
             points = np.array([[row[name] for name in ("per_hour", "right", "low", "high")] for row in rows])
             x, y, low, high = points[np.argsort(points[:, 0], kind="stable")].T
             lines[f"{detector}, {fault}"] = (x, y, low, high)
-    return [Curves("roc", "false alarms per hour", "share of right rotors (–)", lines, True)] if lines else []
+    if not lines:
+        return []
+    title = "right rotors over false alarms, by thresholds"
+    return [Curves("roc", title, "false alarms per hour", "share of right rotors (–)", lines, True)]

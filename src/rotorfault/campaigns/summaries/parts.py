@@ -51,10 +51,12 @@ class Curves(NamedTuple):
     """A figure of lines with intervals: one for each label."""
 
     name: str  # of the file
+    title: str
     x_title: str
     y_title: str
     lines: dict[str, tuple[Array, Array, Array, Array]]  # x, y, lower and upper end of the interval of y
     x_log: bool
+    ideal: tuple[str, Array] | None = None  # what y would be at best: its label, and the x at which it is x itself
 
 
 class Rates(NamedTuple):
