@@ -39,6 +39,7 @@ from rotorfault.report.style import BLACK, VERMILION
 
 Spec = dict[str, Any]
 HEIGHT = 430  # pixels
+ACROSS = 48  # letters of names beside each other
 GREY_BAR, GREY_LINE, FAINT = "rgba(0,0,0,0.55)", "#8a8a8a", "rgba(43,140,208,0.6)"
 GROUND = "#d9d9d9"  # of maps, where nothing was flown
 MARKS = "#2b8cd0"  # seen on light and on dark paper
@@ -361,11 +362,11 @@ def _nullable(values: Array) -> list[Any]:
 
 
 def _layout(views: Sequence[View], title: str = "", ends: tuple[float, float] | None = None) -> Spec:
-    axes = [_axis(view, letters) for view, letters in zip(views, (BESIDE, BELOW), strict=False)]
+    beside = max(BESIDE, ACROSS // len(views[0].values))
+    axes = [_axis(view, letters) for view, letters in zip(views, (beside, BELOW), strict=False)]
     if len(axes) == 2:
         # Names of cases can be long: they get lines of their own, and the room that they need.
-        lines = [text.replace(", ", ",<br>") for text in axes[1]["ticktext"]]
-        axes[1] |= {"automargin": True, "ticktext": lines}
+        axes[1] |= {"automargin": True, "ticktext": [one.replace(", ", ",<br>") for one in axes[1]["ticktext"]]}
     else:
         axes.append({"title": {"text": title}, "range": list(ends or (0.0, 1.0)), "zeroline": False})
     return {
