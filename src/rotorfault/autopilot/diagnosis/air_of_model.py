@@ -2,12 +2,20 @@ r"""What the air does to a body with sound rotors, as the filter of the detector
 
 A force of the air across body z has levers about roll and pitch that nobody knows (drag above the centre of mass,
 flapping blades), and about yaw one that the rotors' speeds and the shift of the centre of mass give. Rotor i has the
-drag :math:`k\Omega_iv`, so all of it attacks at the mean of the rotors' places by speed.
+drag :math:`k\Omega_iv`, so the share :math:`\beta` of all drag that acts at rotors goes with the sum of their speeds
+and attacks at the mean of their places by speed, beside which the centre of mass lies by the shift that the offsets d
+tell,
+
+.. math:: \dot\omega_z \mathrel{+}= \tfrac{\beta m}{J_z}(\bar xf_y - \bar yf_x)
+                                    - \tfrac{\beta}{gJ_z}(J_xf_xd_x + J_yf_yd_y)
 """
 
 from __future__ import annotations
 
-from rotorfault.maths.geometry import PerRotor
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.turbulence import turbulence
@@ -33,6 +41,20 @@ def air_drag(vehicle: Vehicle) -> tuple[float, float]:
         drag += float(vehicle.air.rotor_drag) * turning  # type: ignore[union-attr]
         along += float(vehicle.air.inflow) * turning  # type: ignore[union-attr]
     return drag, along / drag if drag > 0.0 else 1.0
+
+
+def more_drag(speeds: PerRotor, hover: Scalar, share: Scalar) -> Scalar:
+    """Drag over that in hover: each rotor's goes with its speed.
+
+    Parameters
+    ----------
+    speeds : PerRotor, rad/s
+    hover : scalar, rad/s
+        Sum of their sizes in hover.
+    share : scalar
+        Of drag that acts at the rotors.
+    """
+    return 1.0 + share * (speeds.map(absolute).sum() / hover - 1.0)
 
 
 def gust_gradient(wind: float, drag: float, arms: float) -> float:
@@ -90,3 +112,58 @@ def drag_about_yaw(
     turned = (x * left - y * forward) * (over / size.sum())
     beside = share / (vehicle.gravity * J.z)
     return turned, (-forward * (J.x * beside), -left * (J.y * beside))
+
+
+class Blown(NamedTuple):
+    """What the air changes the rates by over a period."""
+
+    yaw: Scalar  # rad/s: drag of the rotors about yaw, at the believed centre of mass
+    levers: tuple[Scalar, Scalar]  # rad/s/m: about roll and pitch, at a lever of 1 m
+    offsets: tuple[Scalar, ...]  # s: about yaw, per offset about roll and pitch; empty where rotors have no drag
+    beside: tuple[Scalar, Scalar]  # rad/s: these, times the offsets
+    wind: tuple[Vec3, ...]  # s/m: of each axis, per force of the air over mass, world axes, at levers that are known
+
+
+def blown_about(
+    believed: Vehicle,
+    learned: Vehicle,
+    speeds: PerRotor,
+    air_W: Vec3,
+    level_W: Sequence[Vec3],
+    arms: tuple[Sequence[Scalar], Sequence[Scalar]],
+    share: Scalar,
+    dt: Scalar,
+) -> Blown:
+    """What the air changes the rates by.
+
+    Levers are learned as what they turn a body of the believed inertia by; where drag of the rotors attacks is known,
+    so that turns the body as its learned inertia has it.
+
+    Parameters
+    ----------
+    believed, learned : Vehicle
+        With the inertia as believed, and as learned.
+    speeds : PerRotor, rad/s
+    air_W : Vec3, m/s^2
+        The air's force over mass, world axes.
+    level_W : sequence of Vec3
+        Body x and y in world axes.
+    arms : two sequences of scalar
+        Levers in m about roll and pitch, and offsets in rad/s^2 about them.
+    share : scalar
+        Of drag that acts at the rotors.
+    dt : scalar, s
+        Length of the period.
+    """
+    forward, left = air_W.dot(level_W[0]), air_W.dot(level_W[1])
+    roll, pitch = lever_rows(believed, forward, left)
+    each = [arm * one for arm, one in zip(arms[0], lever_rows(believed, 1.0, 1.0), strict=True)]
+    wind = [level_W[1] * (each[0] * dt), level_W[0] * (each[1] * dt)]
+    if learned.air == ():
+        return Blown(0.0, (roll * dt, pitch * dt), (), (0.0, 0.0), tuple(wind))
+    yaw, rows = drag_about_yaw(learned, speeds, forward, left, share)
+    a, b = (row * offset * dt for row, offset in zip(rows, arms[1], strict=True))
+    ahead, aside = (drag_about_yaw(learned, speeds, x, y, share) for x, y in ((1.0, 0.0), (0.0, 1.0)))
+    wind.append(level_W[0] * ((ahead[0] + ahead[1][0] * arms[1][0]) * dt))
+    wind[2] = wind[2] + level_W[1] * ((aside[0] + aside[1][1] * arms[1][1]) * dt)
+    return Blown(yaw * dt, (roll * dt, pitch * dt), (rows[0] * dt, rows[1] * dt), (a, b), tuple(wind))

@@ -1,46 +1,40 @@
 r"""What moves a body whose rotors are sound: the model that faults have to beat.
 
 Wind and a wrong model compete with the rotors for the same evidence, so they are states of one filter, each with a
-spread of its own at the start. Angular acceleration and specific force along body z are, to first order,
+spread of its own at the start. Angular acceleration and specific force along body z are
 
-.. math:: \dot\omega = \alpha + \tfrac{T}{mg}\,d + \varphi_J\,e_J + \varphi_w e_w + \varphi_l\,l
-                       - \sum_i\lambda_i F_i J^{-1}b_i, \qquad
+.. math:: \dot\omega = J^{-1}\Big(\tau - \sum_i\lambda_i F_i b_i\Big) + \tfrac{T}{mg}\,d + \varphi_l\,l, \qquad
           f_z = \tfrac{T}{m}(1 - e_m) + f_{air,z} - \sum_i\lambda_i F_i \tfrac{n_i}{m}
 
-with :math:`\alpha` and T of the believed model with sound rotors, and
+with the torque :math:`\tau` and thrust T of sound rotors that follow commands with the learned bandwidth, the spin of
+a body of the learned inertia J, and
 
 - d, angular acceleration by a shifted centre of mass and by unlike drag torques: what is to be seen of them, whatever
   the inertia, so that no product of two unknowns is left;
-- :math:`e_J`, by which share each moment of inertia is larger than believed, :math:`\varphi_J = -\alpha`, and
-  :math:`e_w`, the rotors' bandwidth, :math:`\varphi_w = J^{-1}\tau(s)` with the sensitivities s of
-  `rotorfault.autopilot.diagnosis.model_error`: constants, which a flight that turns the body teaches;
+- :math:`e_J` and :math:`e_w`, the logarithms of the moments of inertia and of the rotors' bandwidth over the believed
+  ones (`rotorfault.autopilot.diagnosis.learned_inertia`, `rotorfault.autopilot.diagnosis.learned_lag`): constants,
+  which a flight that turns the body teaches, and the bandwidth every change of thrust along z as well;
 - l, the levers about roll and pitch at which lateral forces of the air act: drag above the centre of mass, and
-  flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the air's specific force f. So what grows with
-  airspeed belongs to the air;
-- a, force of the wind over mass in world axes, a random walk, which the accelerometer measures on all axes, with the
-  drag of the own way, :math:`f = R^T(a - \tfrac{k_d}mv)`, less along body z, where rotors have no drag;
-  :math:`e_m`, the share of mass and battery;
+  flapping blades, :math:`\varphi_l = m J^{-1}(-f_y, f_x)` with the believed inertia and the air's specific force f,
+  so that what grows with airspeed belongs to the air;
+- a, force of the air over mass in world axes at the rotor speeds of hover, which the accelerometer measures on all
+  axes, :math:`f = R^Ta\,\Sigma\Omega/\Sigma\Omega_0`, less along body z, where rotors have no drag. Own motion
+  changes it by the acceleration that is felt, :math:`\dot a = -\tfrac{k_d}m(Rf_B - ge_z)`, and gusts do as a random
+  walk: so no velocity has to be known; :math:`e_m`, the share of mass and battery;
 - :math:`\lambda_i`, the losses, each taken to last. They are 0, with no variance, where no fault is believed.
 
-Drag of the rotors, the share :math:`\beta` of all, turns the body about yaw. It attacks at their mean place by speed,
-beside which the centre of mass lies by the shift that d tells:
+Drag of the rotors turns the body about yaw (`rotorfault.autopilot.diagnosis.air_of_model`). The wind's force walks
+with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of standard deviation
+:math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle to the other, b
+away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque. What is built
+walks over its whole spread in an hour, and the mass, for the battery, in ten minutes.
 
-.. math:: \dot\omega_z \mathrel{+}= \tfrac{\beta m}{J_z}(\bar xf_y - \bar yf_x)
-                                    - \tfrac{\beta}{gJ_z}(J_xf_xd_x + J_yf_yd_y)
+The filter is linearised where its estimate is. What that leaves out enters as noise: the square of the lag's share,
+:math:`P_{ww} s` of a size, and products of the rates, by the share by which an inertia may be wrong; each lasts about
+as long as a rotor's lag, so its variance times twice that time is the density.
 
-The wind's force walks with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of
-standard deviation :math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle
-to the other, b away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque.
-What is built walks over its whole spread in an hour, and the mass, for the battery, in ten minutes.
-
-The filter is linearised where its estimate is (:math:`1/(1 + e_J)`, `rotorfault.autopilot.diagnosis.learned_lag`).
-What that leaves out enters as noise: the square of the lag's share, :math:`P_{ww} s` of a size, and the products of
-the rates, which a wrong inertia turns into torque; each lasts about as long as a rotor's lag, so its variance times
-twice that time is the density.
-
-What pushes the body upwards beside rotors and wind may turn it: `rotorfault.autopilot.diagnosis.touch`.
-
-Noise and range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
+What pushes the body upwards beside rotors and wind may turn it: `rotorfault.autopilot.diagnosis.touch`. Noise and
+range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
 """
 
 from __future__ import annotations
@@ -48,8 +42,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rotorfault.autopilot.diagnosis import learned_lag, sensed, touch
-from rotorfault.autopilot.diagnosis.air_of_model import ALTITUDE, air_drag, drag_about_yaw, gust_gradient, lever_rows
+from rotorfault.autopilot.diagnosis import air_of_model, learned_lag, sensed, touch
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -60,22 +53,26 @@ from rotorfault.autopilot.diagnosis.kalman import (
     innovation,
     predict,
 )
-from rotorfault.autopilot.diagnosis.model_error import lag_sensitivity, reaction_sensitivity
+from rotorfault.autopilot.diagnosis.learned_inertia import inertia_row, with_inertia
+from rotorfault.autopilot.diagnosis.model_error import lag_sensitivity
 from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import reaction
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, clip, exp, less, maximum, select
+from rotorfault.maths.scalar import Scalar, absolute, clip, exp, less, maximum, select
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
+from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
+from rotorfault.model.signals import Deviations
 from rotorfault.model.turbulence import turbulence
 from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
 
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
+LEARNED = (BANDWIDTH, *range(INERTIA, INERTIA + 3), *range(WIND, WIND + 3))  # what is in the model already
 
-LEAST_INERTIA = 0.5  # share by which an inertia may seem to be wrong: more is no wrong model
+MOST_INERTIA = 1.0  # of the logarithm of a true inertia over the believed one: more is no wrong model
 TINY = 1e-12  # variance of a loss below which it is known
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
@@ -91,9 +88,11 @@ class ModelParameters(NamedTuple):
     touch: touch.TouchParameters
     drag: Scalar  # 1/s: drag over airspeed and mass
     at_rotors: Scalar  # share of it that acts at the rotors
+    turning: Scalar  # rad/s: sum of the rotors' speeds in hover, whose drag that is
     along: Scalar  # drag along body z over that across it
     inertia: Scalar  # share
     lag: Scalar  # s: of the rotors
+    first: Scalar  # rad^2/s^2: variance of the rates at the start
     gyroscope: Scalar  # rad^2/s^2: least variance
     accelerometer: Scalar  # m^2/s^4: least variance
     end: Scalar | tuple[()]  # rad/s: of the gyroscope's range
@@ -106,6 +105,7 @@ class ModelMemory(NamedTuple):
     lagged: PerRotor  # N: lag outputs of sound rotors, with the learned bandwidth
     speed: PerRotor  # rad/s: of sound rotors
     lag: PerRotor  # N: sensitivity of the lag outputs to the logarithm of the bandwidth
+    curve: PerRotor  # N: of that sensitivity, likewise
     reaction: Scalar  # rad/s: of the yaw rate, by the rotors' reaction
     noise: Vec3  # rad^2/s^2: variance of the measured rates
     force_noise: Vec3  # m^2/s^4: variance of the measured specific force
@@ -134,12 +134,12 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     vehicle, s = context.vehicle, settings
     weight = vehicle.mass * vehicle.gravity
     J = vehicle.inertia
-    drag, along = air_drag(vehicle)
+    drag, along = air_of_model.air_drag(vehicle)
     arms = math.sqrt(
         sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors
     )
     lever = s.lever * arms
-    gusts = turbulence(s.wind, ALTITUDE)
+    gusts = turbulence(s.wind, air_of_model.ALTITUDE)
     level = 2.0 * gusts.sigma_level**2 * s.wind / gusts.length_level
     up = 2.0 * gusts.sigma_up**2 * s.wind / gusts.length_up
     yaw = s.torque_ratio * mean_of(vehicle.torque_ratio) * 0.5 * weight
@@ -156,13 +156,15 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     return ModelParameters(
         start=(*constants, *blows, mass),
         walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG + inflow),
-        gradient=Vec3(*(gust_gradient(s.wind, drag, arms) / (j * j) for j in J)),
+        gradient=Vec3(*(air_of_model.gust_gradient(s.wind, drag, arms) / (j * j) for j in J)),
         touch=touch.touch_parameters(context, arms),
         drag=over,
         at_rotors=1.0 - float(vehicle.linear_drag) / drag if drag > 0.0 else 0.0,
+        turning=rotor_speeds(vehicle, hover_thrust(vehicle)).map(absolute).sum(),
         along=along,
         inertia=s.inertia,
         lag=1.0 / w,
+        first=sensed.variance_at_start(context, "rates", s.gyroscope),
         gyroscope=sensed.variance(context, "rates", s.gyroscope),
         accelerometer=sensed.variance(context, "specific_force", s.accelerometer),
         end=sensed.end_of_range(context),
@@ -181,12 +183,16 @@ def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemor
     p, rotors = parameters, inputs.vehicle.rotors
     none = PerRotor.all(0.0, rotors)
     known = (0.0,) * rotors
-    belief = diagonal(
-        (*inputs.estimate.omega_B, *(0.0,) * len(p.start), *known),
-        (*(p.gyroscope,) * 3, *p.start, *known),
-    )
+    mean, variance = [*inputs.estimate.omega_B, *(0.0,) * len(p.start)], [*(p.first,) * 3, *p.start]
+    mean[WIND:MASS] = inputs.estimate.v_W * -p.drag
+    if isinstance(inputs.estimate.std, Deviations):
+        unsure = inputs.estimate.std.v_W * p.drag
+        variance[WIND:MASS] = Vec3.of(variance[WIND:MASS]) + unsure.times(unsure)
+    belief = diagonal((*mean, *known), (*variance, *known))
     hover, speed = inputs.expectation.thrust / inputs.vehicle.rotor_gain, inputs.expectation.speed
-    return ModelMemory(belief, hover, speed, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
+    return ModelMemory(
+        belief, hover, speed, none, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3)
+    )
 
 
 def advance(
@@ -215,8 +221,8 @@ def advance(
         Rate with which losses return to 0 that the motion does not show.
     """
     p, belief = parameters, within_bounds(memory.belief)
-    mean = belief.mean
-    vehicle = learned_lag.with_lag(inputs.vehicle, mean[BANDWIDTH])
+    mean, believed = belief.mean, inputs.vehicle
+    vehicle = with_inertia(learned_lag.with_lag(believed, mean[BANDWIDTH]), Vec3.of(mean[INERTIA:BANDWIDTH]))
     e, lagged = learned_lag.held(memory.lagged, memory.speed, inputs.expectation, inputs.command, vehicle, period)
     dt = e.elapsed
     thrust = e.mean_thrust
@@ -227,24 +233,26 @@ def advance(
         turning = turning + torque_of_turning(vehicle, omega_B, e.speed)
     turn = over_inertia(vehicle, wrench.torque_B + turning)
 
-    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, exp(-mean_bandwidth(vehicle) * period))
+    decay = exp(-mean_bandwidth(vehicle) * period)
+    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, decay)
+    curve = learned_lag.curvature(memory.curve, memory.lag, lag, e, inputs.command, vehicle, decay)
     left = 1.0 - believed_losses(belief, vehicle.rotors)
     lagged_wrench = wrench_of(vehicle, (memory.lag + lag) * 0.5 * left)
     weight = vehicle.mass * vehicle.gravity
     # Thrust that comes later turns later about a shifted centre of mass, too.
-    late = lagged_wrench.thrust / weight
-    lagging = over_inertia(vehicle, lagged_wrench.torque_B) + Vec3.of(mean[OFFSETS : OFFSETS + 3]) * late
-    reacting = reaction_sensitivity(lag, e, vehicle)
-    reacted = Vec3(0.0, 0.0, reacting - memory.reaction)
+    delay = lagged_wrench.thrust / weight
+    lagging = over_inertia(vehicle, lagged_wrench.torque_B) + Vec3.of(mean[OFFSETS : OFFSETS + 3]) * delay
+    reacted = Vec3(0.0, 0.0, learned_lag.turned_by_lag(e.thrust, e.speed, lag, vehicle) - memory.reaction)
     # A rotor that gives nothing does not turn the body about a shifted centre of mass either.
     shifted = Vec3.of(mean[OFFSETS : OFFSETS + 3]) * (dt / weight)
     torque = tuple(_loss_torques(vehicle, thrust, dt, shifted))
     less_thrust = (thrust * (1.0 - left)).sum()
     level_W = inputs.estimate.q_WB.matrix().T.rows
-    # Force of the air over mass: drag of the own way, and what the wind adds.
-    air_W = Vec3.of(mean[WIND : WIND + 3]) - inputs.estimate.v_W * p.drag
-    forward, left_B = air_W.dot(level_W[0]), air_W.dot(level_W[1])
-    lever = lever_rows(vehicle, forward, left_B)
+    # Force of the air over mass: drag of the own way, and what the wind adds; more on rotors that turn faster.
+    more = air_of_model.more_drag(e.speed, p.turning, p.at_rotors) if vehicle.air != () else 1.0
+    air_W = Vec3.of(mean[WIND : WIND + 3]) * more
+    arms = (mean[LEVERS : LEVERS + 2], mean[OFFSETS : OFFSETS + 2])
+    blown = air_of_model.blown_about(believed, vehicle, e.speed, air_W, level_W, arms, p.at_rotors, dt)
     weigh = (wrench.thrust - less_thrust) / weight
 
     beyond: Scalar = 0.0
@@ -255,40 +263,42 @@ def advance(
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
     wrong = _second_order(vehicle, omega_B, lagging, belief, p)
-    felt_B, own_W = inputs.estimate.specific_force_B, inputs.estimate.v_W * p.drag
+    felt_B = inputs.estimate.specific_force_B
     lifts = _lifts(vehicle, e.thrust)
-    air_z = (Vec3.of(mean[WIND : WIND + 3]) - own_W).dot(level_W[2]) * p.along
-    upwards = felt_B.z - lifts.z * (1.0 - mean[MASS]) - air_z
+    upwards = felt_B.z - lifts.z * (1.0 - mean[MASS]) - air_W.dot(level_W[2]) * p.along
     touched, push = touch.pushed(memory.touched, upwards, memory.force_noise.z, p.touch)
-    change = turn * dt + reaction(e, vehicle, stuck)
-    yawed: dict[int, Scalar] = {}
-    if vehicle.air != ():
-        blown, shift_rows = drag_about_yaw(vehicle, e.speed, forward, left_B, p.at_rotors)
-        change = change + Vec3(0.0, 0.0, blown * dt)
-        yawed = {OFFSETS + k: factor * dt for k, factor in enumerate(shift_rows)}
+    change = turn * dt + reaction(e, vehicle, stuck) + Vec3(0.0, 0.0, blown.yaw)
     known: dict[int, Scalar] = {}
     for axis, name in enumerate("xyz"):
         row = {
             OFFSETS + axis: weigh * dt,
             BANDWIDTH: getattr(lagging, name) * dt + getattr(reacted, name),
-            **({LEVERS + axis: lever[axis] * dt} if axis < 2 else yawed),
             **{LOSSES + i: torque[i][axis] for i in range(vehicle.rotors)},
         }
-        # Of what the rotors turn the body by, a wrong inertia is wrong by a share; offsets and levers are learned as
-        # the accelerations that they are. The learned lag is in the model already.
-        learned = row[BANDWIDTH] * mean[BANDWIDTH] - less_thrust * getattr(shifted, name)  # the latter stands twice
-        moved = getattr(change, name)
-        of_losses = {LOSSES + i: row[LOSSES + i] for i in range(vehicle.rotors)}
-        whole = moved + dot(of_losses, mean) + less_thrust * getattr(shifted, name)
-        share = 1.0 / (1.0 + mean[INERTIA + axis])
-        row[INERTIA + axis] = -whole * share * share
-        known[RATES + axis] = moved - learned + whole * (share - 1.0) - row[INERTIA + axis] * mean[INERTIA + axis]
+        # Offsets and levers are learned as the accelerations that they are, whatever the inertia.
+        twice = less_thrust * getattr(shifted, name)
+        turned = getattr(change, name) + dot({k: x for k, x in row.items() if k >= LOSSES}, mean) + twice
+        by_inertia = inertia_row(vehicle, axis, turned, omega_B * dt, omega_B, blown.beside)
+        row |= {INERTIA + k: x for k, x in enumerate(by_inertia)}
+        row |= {WIND + k: x * more for one in blown.wind[axis : axis + 1] for k, x in enumerate(one)}
+        # What is learned of them is in the model already; what the wind turns, in the rows of levers and offsets.
+        known[RATES + axis] = (
+            getattr(change, name) + twice - dot({k: x for k, x in row.items() if k in LEARNED}, mean)
+        )
+        at_arms = {LEVERS + axis: blown.levers[axis]} if axis < 2 else dict(enumerate(blown.offsets, OFFSETS))
+        row |= at_arms
         rows[RATES + axis] = row
         noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name) + getattr(push, name)) * dt + unknown
     if type(pull) is not float or pull != 0.0:  # a number of a batch, or one that is there
         rows |= {LOSSES + i: {LOSSES + i: -pull * dt} for i in range(vehicle.rotors)}
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
     noise |= {LOSSES + i: drifts * dt for i, drifts in enumerate(drift)}
+    # A body that feels nothing at all has no accelerometer.
+    sees = less(0.0, felt_B.dot(felt_B))
+    blind = (1.0 - sees) * BLIND
+    sped_W = inputs.estimate.q_WB.matrix() @ felt_B * dt - Vec3(0.0, 0.0, vehicle.gravity * dt)
+    seen_W = e.now.v_W - e.previous.v_W
+    known |= {WIND + k: -p.drag * select(sees, a, b) for k, (a, b) in enumerate(zip(sped_W, seen_W, strict=True))}
     belief = predict(belief, rows, known, noise)
 
     seen: list[tuple[Sparse, Innovation]] = []
@@ -302,33 +312,37 @@ def advance(
         variances.append(sensed.noise_after(variance, one, p.gyroscope, dt * (1.0 - beyond)))
 
     force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
-    # A body that feels nothing at all has no accelerometer.
-    blind = select(less(0.0, felt_B.dot(felt_B)), 0.0, BLIND)
     variances_of_force: list[Scalar] = []
-    for axis, (felt, lift, variance) in enumerate(zip(felt_B, lifts, memory.force_noise, strict=True)):
+    later = _lifts(vehicle, lag * left) * (1.0 - mean[MASS])
+    for axis, (felt, lift, late, variance) in enumerate(zip(felt_B, lifts, later, memory.force_noise, strict=True)):
         share = p.along if axis == 2 and vehicle.air != () else 1.0
         # While something pushes neither mass nor wind is learned from it.
         doubt = blind + touched.largest * touched.largest if axis == 2 else blind
-        row = {WIND + k: component * share for k, component in enumerate(level_W[axis])}
+        row = {WIND + k: component * (share * more) for k, component in enumerate(level_W[axis])}
+        if axis == 2 or vehicle.tilt != ():
+            row |= {BANDWIDTH: late}
         if axis == 2:
             row |= {MASS: -lift, **{LOSSES + i: value for i, value in enumerate(force)}}
         unsure = maximum(variance, force_shaken) + doubt
-        one = innovation(belief, row, felt - lift + own_W.dot(level_W[axis]) * share, unsure)
+        # The learned lag is in the lift already.
+        one = innovation(belief, row, felt - lift + late * mean[BANDWIDTH], unsure)
         belief = follow(belief, one)
         seen.append((row, one))
         variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))
 
-    lagged = lagged + lag * (belief.mean[BANDWIDTH] - mean[BANDWIDTH])
+    # Where the bandwidth has moved to, thrust and sensitivities are others.
+    moved = belief.mean[BANDWIDTH] - mean[BANDWIDTH]
+    lagged = lagged + (lag + curve * (0.5 * moved)) * moved / vehicle.rotor_gain
+    lag = lag + curve * moved
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
     seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
-    after = ModelMemory(belief, lagged, speed, lag, reacting, *seen_noise, touched)
+    reacting = learned_lag.turned_by_lag(lagged * vehicle.rotor_gain, speed, lag, vehicle)
+    after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, touched)
     return after, Step(rows, torque, force, tuple(seen), noise)
 
 
 def within_bounds(belief: Belief) -> Belief:
-    """A state whose shares of inertia and bandwidth are what a wrong model can be.
-
-    Beyond these a share would turn a torque round, or have no effect that could bring it back.
+    """A state whose inertia and bandwidth are what a wrong model can be; beyond, nothing might bring them back.
 
     Parameters
     ----------
@@ -336,7 +350,7 @@ def within_bounds(belief: Belief) -> Belief:
     """
     mean = list(belief.mean)
     for k in (INERTIA, INERTIA + 1, INERTIA + 2):
-        mean[k] = clip(mean[k], -LEAST_INERTIA, LEAST_INERTIA)
+        mean[k] = clip(mean[k], -MOST_INERTIA, MOST_INERTIA)
     mean[BANDWIDTH] = clip(mean[BANDWIDTH], -learned_lag.MOST, learned_lag.MOST)
     return belief._replace(mean=tuple(mean))
 

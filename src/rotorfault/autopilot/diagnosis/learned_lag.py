@@ -5,18 +5,20 @@ sensitivity follow
 
 .. math:: \dot v = w e^{e_w}(c - v), \qquad \dot s = w e^{e_w}(c - v - s), \qquad s = \frac{\partial v}{\partial e_w}
 
-and when a measurement moves :math:`e_w` by :math:`\Delta`, v moves by :math:`s\Delta`: an extended Kalman filter
-that is linearised where its estimate is.
+and when a measurement moves :math:`e_w` by :math:`\Delta`, v moves by :math:`s\Delta + \tfrac12r\Delta^2` and s by
+:math:`r\Delta`, with :math:`\dot r = w e^{e_w}(c - v - 2s - r), r = \frac{\partial s}{\partial e_w}`: an extended
+Kalman filter that is linearised where its estimate is, and not where that was while the rotors moved.
 """
 
 from __future__ import annotations
 
 from rotorfault.autopilot.prediction import Expectation
-from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, exp
+from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.scalar import Scalar, absolute, exp, maximum
 from rotorfault.model.motion import lag_bandwidth, lag_held, limited
-from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds
 
+TINY = 1e-12  # N: thrust of a rotor that stands
 MOST = 1.0  # of the logarithm: a bandwidth that is more than e times another is no wrong model of it
 
 
@@ -68,3 +70,58 @@ def held(
         sped=turning - speed,
     )
     return e, end
+
+
+def curvature(
+    curve: PerRotor,
+    before: PerRotor,
+    lag: PerRotor,
+    expectation: Expectation,
+    command: PerRotor,
+    vehicle: Vehicle,
+    decay: Scalar,
+) -> PerRotor:
+    """Derivative in N of the thrusts' sensitivity by the logarithm of the bandwidth, one period later.
+
+    Parameters
+    ----------
+    curve : PerRotor, N
+        Of the instant before.
+    before, lag : PerRotor, N
+        The sensitivity then and now, from `rotorfault.autopilot.diagnosis.model_error.lag_sensitivity`.
+    expectation : Expectation
+        From `held`.
+    command : PerRotor, N
+        Held over the period.
+    vehicle : Vehicle
+        From `with_lag`.
+    decay : scalar
+        What remains of a rotor's lag over one period.
+    """
+    entering = limited(vehicle, command)
+    bandwidth = lag_bandwidth(vehicle, expectation.thrust / vehicle.rotor_gain, entering)
+    ahead = entering * vehicle.rotor_gain - expectation.thrust
+    after: PerRotor = curve * decay + (ahead - lag - before * decay) * (bandwidth * expectation.elapsed)
+    return after
+
+
+def turned_by_lag(thrust: PerRotor, speed: PerRotor, lag: PerRotor, vehicle: Vehicle) -> Scalar:
+    r"""Sensitivity in rad/s of the yaw rate to the logarithm of the bandwidth, by the rotors' reaction.
+
+    A rotor's speed is a root of its thrust, :math:`\partial\Omega/\partial e_w = |\Omega|s/2|F|`; where s is more
+    than F, of a rotor that is about to turn the other way, as if F were that.
+
+    Parameters
+    ----------
+    thrust : PerRotor, N
+    speed : PerRotor, rad/s
+        Of sound rotors, that give it.
+    lag : PerRotor, N
+        Sensitivity of the thrusts.
+    vehicle : Vehicle
+        From `with_lag`.
+    """
+    sizes = thrust.map(lambda force, s: maximum(maximum(absolute(force), absolute(s)), TINY), lag)
+    faster = speed.map(lambda omega, s, size: absolute(omega) * (0.5 * s / size), lag, sizes)
+    residual = residual_speed(vehicle, faster)
+    return -rate_against_rotors(vehicle, residual.z if isinstance(residual, Vec3) else residual)

@@ -48,6 +48,24 @@ def variance(context: Context, sensor: str, least: float) -> float:
     return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration) ** 2, least**2)
 
 
+def variance_at_start(context: Context, sensor: str, least: float) -> float:
+    """Variance of a sensor's first number, of which no filter has taken vibration yet, or of a least noise.
+
+    Parameters
+    ----------
+    context : Context
+        With the sensors as believed.
+    sensor : str
+        Field of `rotorfault.model.sensor_model.SensorModel`.
+    least : float
+        Standard deviation, in the sensor's unit.
+    """
+    noise = getattr(context.sensors, sensor, ())
+    if not isinstance(noise, SensorNoise):
+        return least**2
+    return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration + noise.filtered) ** 2, least**2)
+
+
 def end_of_range(context: Context) -> Scalar | tuple[()]:
     """End in rad/s of the gyroscope's range; empty where it has none.
 
