@@ -131,9 +131,12 @@ def test_wind_turns_a_body_whose_levers_are_known_as_the_drag_of_its_rotors_does
 
 
 def advanced(
-    felt: list[float], command: list[float], velocity: list[float], noise: SensorModel
-) -> fault_free.ModelMemory:
-    """The filter's memory after instants of a level Crazyflie that feels so much along z, and does not turn."""
+    felt: list[float], command: list[float], velocity: list[float], noise: SensorModel, heavier: float = 0.0
+) -> tuple[fault_free.ModelMemory, fault_free.Step]:
+    """Memory and last step of the filter of a level Crazyflie that feels so much along z, and does not turn.
+
+    At its last instant it has learned an inertia whose logarithm is larger by so much.
+    """
     vehicle = load_vehicle("crazyflie-2.1").vehicle
     parameters = fault_free.model_parameters(ModelSettings(), Context(vehicle, T, noise))
     thrust = hover_thrust(vehicle)
@@ -155,10 +158,14 @@ def advanced(
         )
         inputs = DiagnosisInputs(now, expectation, commands, vehicle, Readings(rates=Reading(now.omega_B)))
         memory = fault_free.at_start(inputs, parameters) if memory is None else memory
-        memory, _ = fault_free.advance(memory, inputs, parameters, sound, sound, T)
+        if heavier and k == len(felt) - 1:
+            mean = list(memory.belief.mean)
+            mean[fault_free.INERTIA : fault_free.INERTIA + 3] = [heavier] * 3
+            memory = memory._replace(belief=memory.belief._replace(mean=tuple(mean)))
+        memory, step = fault_free.advance(memory, inputs, parameters, sound, sound, T)
         before = motion
     assert memory is not None
-    return memory
+    return memory, step
 
 
 def test_a_change_of_thrust_along_z_teaches_the_lag() -> None:
@@ -171,7 +178,7 @@ def test_a_change_of_thrust_along_z_teaches_the_lag() -> None:
             output += (command - output) * (1.0 - math.exp(-T * float(vehicle.rotor_bandwidth) * math.exp(wrong)))
             commands.append(command)
             felt.append(4.0 * output / vehicle.mass)
-        memory = advanced(felt, commands, [0.0] * 600, SensorModel())
+        memory, _ = advanced(felt, commands, [0.0] * 600, SensorModel())
         learned, variance = (
             float(memory.belief.mean[fault_free.BANDWIDTH]),
             float(memory.belief.of(fault_free.BANDWIDTH, fault_free.BANDWIDTH)),
@@ -185,8 +192,8 @@ def test_what_the_air_does_is_known_without_a_velocity() -> None:
     vehicle = load_vehicle("crazyflie-2.1").vehicle
     hover, steps = vehicle.mass * vehicle.gravity / 4.0, 60
     felt, commands = [vehicle.gravity] * steps, [hover] * steps
-    still = advanced(felt, commands, [0.0] * steps, SensorModel())
-    jumps = advanced(felt, commands, [0.0] * 30 + [9.0] * 30, SensorModel())
+    still, _ = advanced(felt, commands, [0.0] * steps, SensorModel())
+    jumps, _ = advanced(felt, commands, [0.0] * 30 + [9.0] * 30, SensorModel())
     assert still.belief == jumps.belief
     assert still.belief.mean[fault_free.WIND] == pytest.approx(0.3, abs=0.05)
 
@@ -198,5 +205,17 @@ def test_the_first_rate_has_all_of_its_vibration() -> None:
     assert p.first == pytest.approx(0.002**2 + 0.5 * 0.3**2)
     assert p.gyroscope == pytest.approx(0.002**2 + 0.5 * 0.01**2)
     hover = load_vehicle("crazyflie-2.1").vehicle.gravity
-    memory = advanced([hover], [0.0662], [0.0], noise)
+    memory, _ = advanced([hover], [0.0662], [0.0], noise)
     assert float(memory.belief.of(fault_free.RATES, fault_free.RATES)) < p.gyroscope  # and one instant later it is
+
+
+def test_a_loss_that_is_not_believed_turns_the_inertia_that_was_believed() -> None:
+    """What is learned while it is taken for a wrong model is wrong; a loss that is believed turns the learned one."""
+    vehicle = load_vehicle("crazyflie-2.1").vehicle
+    felt, commands = [vehicle.gravity] * 3, [vehicle.mass * vehicle.gravity / 4.0] * 3
+    (_, light), (_, heavy) = (advanced(felt, commands, [0.0] * 3, SensorModel(), by) for by in (0.0, 0.4))
+    for one, other in zip(light.torque, heavy.torque, strict=True):
+        assert np.allclose(one, other, rtol=1e-6)
+    for axis in range(3):
+        loss = fault_free.LOSSES
+        assert heavy.rows[axis][loss] == pytest.approx(light.rows[axis][loss] * math.exp(-0.4), rel=1e-3)

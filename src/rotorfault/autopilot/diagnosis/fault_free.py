@@ -33,8 +33,8 @@ The filter is linearised where its estimate is. What that leaves out enters as n
 :math:`P_{ww} s` of a size, and products of the rates, by the share by which an inertia may be wrong; each lasts about
 as long as a rotor's lag, so its variance times twice that time is the density.
 
-What pushes the body upwards beside rotors and wind may turn it: `rotorfault.autopilot.diagnosis.touch`. Noise and
-range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
+What pushes the body upwards may turn it: `rotorfault.autopilot.diagnosis.touch`. Noise and range of the sensors:
+`rotorfault.autopilot.diagnosis.sensed`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10,
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
 LEARNED = (BANDWIDTH, *range(INERTIA, INERTIA + 3), *range(WIND, WIND + 3))  # what is in the model already
 
-MOST_INERTIA = 1.0  # of the logarithm of a true inertia over the believed one: more is no wrong model
+MOST_INERTIA = 0.5  # of the logarithm of a true inertia over the believed one: more is no wrong model
 TINY = 1e-12  # variance of a loss below which it is known
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
@@ -181,8 +181,7 @@ def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemor
     parameters : ModelParameters
     """
     p, rotors = parameters, inputs.vehicle.rotors
-    none = PerRotor.all(0.0, rotors)
-    known = (0.0,) * rotors
+    none, known = PerRotor.all(0.0, rotors), (0.0,) * rotors
     mean, variance = [*inputs.estimate.omega_B, *(0.0,) * len(p.start)], [*(p.first,) * 3, *p.start]
     mean[WIND:MASS] = inputs.estimate.v_W * -p.drag
     if isinstance(inputs.estimate.std, Deviations):
@@ -335,10 +334,12 @@ def advance(
     lagged = lagged + (lag + curve * (0.5 * moved)) * moved / vehicle.rotor_gain
     lag = lag + curve * moved
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
-    seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
     reacting = learned_lag.turned_by_lag(lagged * vehicle.rotor_gain, speed, lag, vehicle)
+    seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
     after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, touched)
-    return after, Step(rows, torque, force, tuple(seen), noise)
+    # A loss that is not believed has made the learned inertia wrong: what it turns, it turns over the believed one.
+    lost = tuple(_loss_torques(believed, thrust, dt, shifted))
+    return after, Step(rows, lost, force, tuple(seen), noise)
 
 
 def within_bounds(belief: Belief) -> Belief:
