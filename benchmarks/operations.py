@@ -25,6 +25,7 @@ import rotorfault as rf
 from rotorfault.engine import native
 from rotorfault.engine.program import program, same_for_all, trace
 from rotorfault.flight.assembly import assemble
+from rotorfault.scenario.overrides import parse_overrides
 
 LEAST = {
     "diagnosis off": {"diagnosis": "off"},
@@ -68,7 +69,7 @@ def main() -> None:
     parser.add_argument("--scenario", default="paper-set-point")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     chosen = parser.parse_args()
-    settings = dict(part.split("=", 1) for part in chosen.set)
+    settings = parse_overrides(chosen.set)
     scenario = loaded(chosen.scenario, settings)
     for name, with_signals in (("quiet", False), ("recording", True)):
         counts = operations(scenario, with_signals)

@@ -1,7 +1,7 @@
 """What real sensing costs: the paper's three cases, faults of sensors, and the spin after a total loss.
 
     python benchmarks/real_sensing.py [--flights 50] [--only paper faults after spin known] [--tracking so3]
-        [--json FILE]
+        [--set KEY=VALUE ...] [--json FILE]
 
 *paper*: the three cases of the paper (set point, sinusoid, square) with each set of sensors, the plant being
 `rigid_body`: the paper's model takes Euler rates for body rates, which no gyro measures. Flights that survive, error
@@ -9,7 +9,8 @@ of position after 2 s (root mean square, median flight), cost J (median). Attitu
 `euler`, or with `--tracking so3` by rotations.
 
 *faults*: hover of a Hummingbird in gusts of 5 m/s, with a set of sensors and every kind of fault of each, while the
-observer looks for faults of rotors. Survived, and the largest distance from the reference.
+observer looks for faults of rotors. Survived, the largest distance from the reference, and flights in which a rotor
+was blamed. `--set sensor_check=off` believes frozen sensors.
 
 *after*: the same vehicle after faults of rotors, by each estimator.
 
@@ -40,6 +41,7 @@ from numpy.typing import NDArray
 import rotorfault as rf
 from rotorfault.base.files import write_durably
 from rotorfault.campaigns.sampling.statistics import clopper_pearson
+from rotorfault.scenario.overrides import parse_overrides
 
 Array = NDArray[np.float64]
 RECORDED = 0.005  # s between two records of a spin
@@ -88,12 +90,16 @@ SPIN_SETS: dict[str, dict[str, Any]] = {
 }
 
 
+CHANGES: dict[str, Any] = {}  # settings of all flights besides
+
+
 def flown(scenario: str, settings: dict[str, Any], flights: int) -> dict[str, Any]:
     """What became of flights that differ in their seed."""
     record = ("position", "position_reference", "body_rates.z")
     many = rf.fly_many(
-        scenario, {"seed": range(1, flights + 1)}, settings=settings, record=record, record_period=0.01, warn=False
-    )
+        scenario, {"seed": range(1, flights + 1)}, settings=settings | CHANGES, record=record, record_period=0.01,
+        warn=False,
+    )  # fmt: skip
     alive = np.asarray(many.table["survived"], dtype=bool)
     position, wanted, yaw = many.signals[:, 0:3], many.signals[:, 3:6], many.signals[:, 6]
     distance = np.sqrt(((position - wanted) ** 2).sum(axis=1))
@@ -110,6 +116,7 @@ def flown(scenario: str, settings: dict[str, Any], flights: int) -> dict[str, An
         "high": float(high),
         "error": error,
         "farthest": far,
+        "blamed": int((np.asarray(many.table["false_alarms"], dtype=float) > 0).sum()),
         "cost": float(np.median(np.asarray(many.table["cost"], dtype=float))),
         "yaw_rate": float(np.median(fastest[alive])) if alive.any() else None,
         "yaw_rate_lost": float(np.median(fastest[~alive])) if (~alive).any() else None,
@@ -248,9 +255,11 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=50)
     parser.add_argument("--only", nargs="+", choices=list(PARTS), default=list(PARTS))
     parser.add_argument("--tracking", choices=("euler", "so3"), default="euler", help="of the paper's cases")
+    parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="other settings")
     parser.add_argument("--json", type=Path)
     chosen = parser.parse_args()
     warnings.simplefilter("ignore", rf.ControllerWarning)
+    CHANGES.update(parse_overrides(chosen.set))
     results = {}
     for part in chosen.only:
         more = {"tracking": chosen.tracking} if part == "paper" else {}
@@ -264,13 +273,13 @@ def main() -> None:
                     f"{1e3 * row['wobble_of_error']:14.2f}"
                 )
             continue
-        print(f"\n{part:48s} survived (95 %)             error m  farthest m   cost J  yaw rad/s (lost)")
+        print(f"\n{part:48s} survived (95 %)             error m  farthest m   cost J  blamed  yaw rad/s (lost)")
         for name, row in results[part].items():
             share = f"{row['survived']}/{row['flights']} ({100 * row['low']:.1f} to {100 * row['high']:.1f} %)"
             rate, lost = (f"{row[key]:.1f}" if row[key] else "-" for key in ("yaw_rate", "yaw_rate_lost"))
             print(
                 f"{name:48s} {share:26s} {row['error']:8.3f} {row['farthest']:10.2f} {row['cost']:9.3g}"
-                f"  {rate} ({lost})",
+                f" {row['blamed']:7d}  {rate} ({lost})",
                 flush=True,
             )
     if chosen.json:

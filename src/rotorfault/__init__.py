@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
     from rotorfault.autopilot.estimation.imu_filter import FilterInputs, ImuFilter
     from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs
+    from rotorfault.autopilot.estimation.sensor_check import CheckInputs, SensorCheck
     from rotorfault.autopilot.instant import Decision
     from rotorfault.autopilot.response.protocol import Response, ResponseInputs
     from rotorfault.base.config import Strict as Settings
@@ -99,6 +100,7 @@ _HOME = {
     "BlockReport": "flight.check_block",
     "BodyModel": "plant.models",
     "Campaign": "campaigns.api",
+    "CheckInputs": "autopilot.estimation.sensor_check",
     "Comparison": "flight.comparison",
     "Context": "model.block",
     "ControlAuthority": "analysis.controllability",
@@ -144,6 +146,7 @@ _HOME = {
     "SensorInputs": "plant.sensors",
     "SensorModel": "model.sensor_model",
     "SensorNoise": "model.sensor_model",
+    "SensorCheck": "autopilot.estimation.sensor_check",
     "Sensors": "plant.sensors",
     "Settings": "base.config",
     "State": "model.signals",
@@ -204,6 +207,7 @@ __all__ = [
     "BlockReport",
     "BodyModel",
     "Campaign",
+    "CheckInputs",
     "Comparison",
     "Context",
     "ControlAuthority",
@@ -248,6 +252,7 @@ __all__ = [
     "Response",
     "ResponseInputs",
     "Scenario",
+    "SensorCheck",
     "SensorInputs",
     "SensorModel",
     "SensorNoise",

@@ -286,7 +286,7 @@ def test_structure_is_one_word_per_part() -> None:
     slots = [word.partition(":")[0] for word in parts]
     truth, belief = (
         ["wind", "fault", "fault", "plant", "sensors"],
-        ["imu_filter", "estimator", "diagnosis", "on_fault"],
+        ["sensor_check", "imu_filter", "estimator", "diagnosis", "on_fault"],
     )
     assert slots == [*truth, *belief, "controller", "allocation"]
     assert "RigidBody" in parts[slots.index("plant")]

@@ -107,9 +107,9 @@ def test_a_slot_names_its_parts_in_messages_by_its_singular() -> None:
 def test_slots_are_in_the_order_in_which_they_act() -> None:
     assert [slot.name for slot in SLOTS] == [
         "reference", "wind", "fault", "ground", "plant", "sensors",
-        "imu_filter", "estimator", "diagnosis", "on_fault", "controller", "allocation",
+        "sensor_check", "imu_filter", "estimator", "diagnosis", "on_fault", "controller", "allocation",
     ]  # fmt: skip
-    assert [slot.side for slot in SLOTS] == ["task"] + ["truth"] * 5 + ["belief"] * 6
+    assert [slot.side for slot in SLOTS] == ["task"] + ["truth"] * 5 + ["belief"] * 7
     assert len({slot.group for slot in SLOTS}) == len(SLOTS)
 
 

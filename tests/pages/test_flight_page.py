@@ -196,6 +196,20 @@ def test_panels_leave_out_estimates_that_are_the_truth(faulty: rf.Flight) -> Non
     assert labels == [["true", "desired"], ["true", "estimated", "desired"]]
 
 
+def test_an_estimated_wind_stands_beside_the_true_one(faulty: rf.Flight) -> None:
+    records = faulty.records()
+    count = len(records["time"].values)
+    wind = Variable(("time", "axis"), np.arange(3.0 * count).reshape(count, 3), {"units": "m/s"})
+    data = derived(
+        FlightData({**records.variables, "estimator.wind": wind}, records.coordinates, records.attrs), None
+    )
+    found = [panel for panel in panels(data, {}) if any(c.signal == "estimator.wind" for c in panel.curves)]
+    assert [panel.name for panel in found] == ["wind.x", "wind.y", "wind.z"]
+    assert all(
+        [(c.signal, c.role) for c in p.curves] == [("wind", "true"), ("estimator.wind", "believed")] for p in found
+    )
+
+
 def test_what_cannot_be_shown_is_refused(faulty: rf.Flight, tmp_path: Path) -> None:
     empty = faulty.records().isel(time=slice(0, 0))
     with pytest.raises(rf.InputError, match="no records"):

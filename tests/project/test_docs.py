@@ -46,6 +46,7 @@ PAGE_OF = {
     "ground": "scenarios.md",
     "plant": "scenarios.md",
     "sensors": "scenarios.md",
+    "sensor_check": "scenarios.md",
     "imu_filter": "scenarios.md",
     "estimator": "scenarios.md",
     "diagnosis": "diagnosis.md",

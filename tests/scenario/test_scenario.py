@@ -54,7 +54,8 @@ def test_parts_are_had_by_slot_and_by_name() -> None:
     assert ground.kind == "level"
     assert [(slot.name, part.kind) for slot, part in made.parts()] == [
         ("reference", "set_point"), ("wind", "constant"), ("fault", "step"), ("fault", "total"), ("ground", "level"),
-        ("plant", "rigid_body"), ("sensors", "ideal"), ("imu_filter", "off"), ("estimator", "direct"),
+        ("plant", "rigid_body"), ("sensors", "ideal"), ("sensor_check", "off"), ("imu_filter", "off"),
+        ("estimator", "direct"),
         ("diagnosis", "luenberger"), ("on_fault", "continue"), ("controller", "smc"), ("allocation", "effectiveness"),
     ]  # fmt: skip
     assert all(isinstance(part, Part) and part.slot is slot for slot, part in made.parts())

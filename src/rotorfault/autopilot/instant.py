@@ -91,7 +91,12 @@ class Instant:
     @property
     def readings(self) -> Readings:
         """The readings, as the filter of the inertial unit leaves them."""
-        return cast("Readings", self.outputs.get("imu_filter", self.read))
+        return cast("Readings", self.outputs.get("imu_filter", self.checked))
+
+    @property
+    def checked(self) -> Readings:
+        """The readings, those not valid that are held for frozen."""
+        return cast("Readings", self.outputs.get("sensor_check", self.read))
 
     @cached_property
     def speed(self) -> PerRotor:

@@ -104,6 +104,19 @@ def example(telemetry: type[tuple[Any, ...]], rotors: int = 4) -> Any:
     return telemetry(*(value_of(signal.kind, rotors) for signal in signals_of(telemetry)))
 
 
+def joined(name: str, *records: type[tuple[Any, ...]]) -> Any:
+    """A telemetry record with the fields of several, where which they are is known only when a part is made.
+
+    Parameters
+    ----------
+    name : str
+        Of the type.
+    records : types of NamedTuple
+    """
+    fields = [each for one in records for each in get_type_hints(one, include_extras=True).items()]
+    return NamedTuple(name, fields)
+
+
 @final
 class Layout:
     """The rows of a recording: which signals, in which order.

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 FOOT = 0.3048  # m
+EXPECTED_AT = 10.0  # m: height of what an autopilot expects; weaker and longer gusts higher up are on the safe side
 
 
 class Turbulence(NamedTuple):
@@ -37,3 +38,20 @@ def turbulence(wind_at_6m: float, altitude: float) -> Turbulence:
     shape = 0.177 + 0.000823 * altitude / FOOT
     sigma_up = 0.1 * wind_at_6m
     return Turbulence(sigma_up / shape**0.4, sigma_up, altitude / shape**1.2, altitude)
+
+
+def gained(gusts: Turbulence, speed: float) -> tuple[float, float]:
+    r"""Variance in m^2/s^3 that the air's velocity gains in a second, at first: along a horizontal axis, and upwards.
+
+    Gusts along the wind have the autocorrelation :math:`e^{-x}`, those across it and upwards :math:`(1 - x/2)e^{-x}`
+    with :math:`x = tV/L`; so they gain :math:`2\sigma^2V/L` and :math:`3\sigma^2V/L`. Where the wind comes from is
+    not known, so a horizontal axis has the mean of both.
+
+    Parameters
+    ----------
+    gusts : Turbulence
+    speed : float, m/s
+        With which they are carried past.
+    """
+    level = 2.5 * gusts.sigma_level**2 * speed / gusts.length_level
+    return level, 3.0 * gusts.sigma_up**2 * speed / gusts.length_up

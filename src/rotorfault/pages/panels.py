@@ -156,6 +156,9 @@ def _motion(data: FlightData) -> Iterator[Panel]:
         if angle == "yaw":
             curves = (*curves[:2], Curve("yaw_reference", 0, "desired", ASKED))
         yield Panel(f"attitude.{angle}", "Motion", angle, "rad", _curves(data, *curves))
+    for k, axis in enumerate(AXES if "estimator.wind" in data else ()):
+        curves = (Curve("wind", k, "true", TRUE), Curve("estimator.wind", k, "estimated", BELIEVED))
+        yield Panel(f"wind.{axis}", "Motion", f"wind {axis}", "m/s", _curves(data, *curves))
 
 
 def _rotors(data: FlightData, limits: Mapping[str, float]) -> Iterator[Panel]:

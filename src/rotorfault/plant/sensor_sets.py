@@ -213,6 +213,7 @@ class SensorSet(Sensors[Any, Any]):
     limits_grid: ClassVar[bool] = True
     estimator: ClassVar[str] = "eskf"
     imu_filter: ClassVar[str] = "rotor_notch"
+    sensor_check: ClassVar[str] = "repeats"
     Telemetry = SetSignals
 
     def __init__(self, settings: Any = None) -> None:

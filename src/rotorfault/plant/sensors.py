@@ -44,12 +44,13 @@ class Sensors(Block[SensorInputs, Readings, MemoryT, ParametersT]):
     ----------
     estimator : str
         Of a scenario with these sensors that names none.
-    imu_filter : str
+    imu_filter, sensor_check : str
         Likewise.
     """
 
     estimator: ClassVar[str] = "direct"
     imu_filter: ClassVar[str] = "off"
+    sensor_check: ClassVar[str] = "off"
 
     def model(self, context: Context) -> SensorModel:
         """What the autopilot may believe of the set, as a data sheet says it; nothing, if a part says nothing.

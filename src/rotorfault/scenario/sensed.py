@@ -1,4 +1,4 @@
-"""Estimator and IMU filter of a scenario that names none: those that its sensors ask for."""
+"""Estimator, IMU filter and sensor check of a scenario that names none: those that its sensors ask for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rotorfault.scenario.part import Part, part_from
 from rotorfault.scenario.slots import SLOTS
 
 SENSORS = SLOTS["sensors"]
-ASKED_FOR = (SLOTS["imu_filter"], SLOTS["estimator"])
+ASKED_FOR = (SLOTS["sensor_check"], SLOTS["imu_filter"], SLOTS["estimator"])
 """Slots whose part is the sensors' choice, where a scenario names none."""
 
 

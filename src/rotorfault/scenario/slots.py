@@ -11,7 +11,7 @@ from typing import Any, final
 from rotorfault.autopilot.allocation import ALLOCATION
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
-from rotorfault.autopilot.estimation import ESTIMATOR, IMU_FILTER
+from rotorfault.autopilot.estimation import ESTIMATOR, IMU_FILTER, SENSOR_CHECK
 from rotorfault.autopilot.response import ON_FAULT
 from rotorfault.base.errors import InputError, unknown
 from rotorfault.model.slot import Slot, slot_of
@@ -100,6 +100,7 @@ SLOTS = Slots(
         GROUND,
         PLANT,
         SENSORS,
+        SENSOR_CHECK,
         IMU_FILTER,
         ESTIMATOR,
         DIAGNOSIS,

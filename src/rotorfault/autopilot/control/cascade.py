@@ -23,7 +23,7 @@ attitude reference is level, thrust and torques still pass through the rotors.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple, cast, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 from pydantic import Field, create_model
 
@@ -56,7 +56,7 @@ from rotorfault.maths.scalar import Scalar, any_of, maximum
 from rotorfault.model.block import Context, Record
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
 from rotorfault.model.signals import Estimate, Reference, Wrench
-from rotorfault.model.telemetry import RPY, Q, W
+from rotorfault.model.telemetry import RPY, Q, W, joined
 from rotorfault.model.vehicle import body_momentum, wrench_of
 
 YawLost = Literal["relaxed", "upright"]
@@ -346,12 +346,7 @@ class CascadeKind:
             law=(law.Settings, Field(default=law.Settings(), description="the control law")),
             cascade=(CascadeSettings, Field(default=CascadeSettings(), description=CascadeSettings.__doc__)),
         )
-        fields = [
-            (field, hint)
-            for kind in (CascadeSignals, *law.records)
-            for field, hint in get_type_hints(kind, include_extras=True).items()
-        ]
-        self.Telemetry = cast("type[Record]", _record(f"{name.capitalize()}Signals", fields))
+        self.Telemetry: type[Record] = joined(f"{name.capitalize()}Signals", CascadeSignals, *law.records)
 
     @property
     def Settings(self) -> type[Strict]:
@@ -361,13 +356,6 @@ class CascadeKind:
     def __call__(self, settings: Any, /) -> Cascade:
         """Make the controller."""
         return Cascade(self.law(settings.law), settings.cascade, self.Telemetry)
-
-
-def _record(name: str, fields: list[tuple[str, Any]]) -> Any:
-    """A NamedTuple type of fields that are known only when a law is registered."""
-    record = NamedTuple(name, fields)  # type: ignore[misc]
-    record.__module__ = __name__
-    return record
 
 
 def register_law(name: str, law: type[Law[Any]]) -> None:

@@ -18,10 +18,9 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute
 from rotorfault.model.mixer import hover_thrust
-from rotorfault.model.turbulence import turbulence
+from rotorfault.model.turbulence import EXPECTED_AT, turbulence
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
 
-ALTITUDE = 10.0  # m: at which gusts are expected; that they are weaker and longer higher up is on the safe side
 STILL = 1.0  # m/s: least wind that carries gusts past
 
 
@@ -68,7 +67,7 @@ def gust_gradient(wind: float, drag: float, arms: float) -> float:
     arms : float, m
         Of the rotors.
     """
-    gusts, across = turbulence(wind, ALTITUDE), 2.0 * arms
+    gusts, across = turbulence(wind, EXPECTED_AT), 2.0 * arms
     torque = 0.5 * drag * arms
     both = (gusts.sigma_up**2 / gusts.length_up, gusts.sigma_level**2 / gusts.length_level)
     return max(2.0 * across * share for share in both) * torque**2 * 2.0 * across / max(wind, STILL)

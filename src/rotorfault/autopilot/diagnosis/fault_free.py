@@ -65,7 +65,7 @@ from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
 from rotorfault.model.signals import Deviations
-from rotorfault.model.turbulence import turbulence
+from rotorfault.model.turbulence import EXPECTED_AT, turbulence
 from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
 
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
@@ -139,7 +139,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         sum(x * x + y * y for x, y in zip(vehicle.rotor_x, vehicle.rotor_y, strict=True)) / vehicle.rotors
     )
     lever = s.lever * arms
-    gusts = turbulence(s.wind, air_of_model.ALTITUDE)
+    gusts = turbulence(s.wind, EXPECTED_AT)
     level = 2.0 * gusts.sigma_level**2 * s.wind / gusts.length_level
     up = 2.0 * gusts.sigma_up**2 * s.wind / gusts.length_up
     yaw = s.torque_ratio * mean_of(vehicle.torque_ratio) * 0.5 * weight

@@ -9,10 +9,19 @@ from rotorfault.autopilot.estimation.eskf import Eskf
 from rotorfault.autopilot.estimation.imu_filter import IMU_FILTER, FilterInputs, ImuFilter, Unfiltered
 from rotorfault.autopilot.estimation.protocol import ESTIMATOR, Estimator, EstimatorInputs
 from rotorfault.autopilot.estimation.rotor_notch import RotorNotch
+from rotorfault.autopilot.estimation.sensor_check import (
+    SENSOR_CHECK,
+    CheckInputs,
+    Repeats,
+    SensorCheck,
+    Unchecked,
+)
 
 __all__ = [
     "ESTIMATOR",
     "IMU_FILTER",
+    "SENSOR_CHECK",
+    "CheckInputs",
     "Complementary",
     "Direct",
     "Eskf",
@@ -20,6 +29,9 @@ __all__ = [
     "EstimatorInputs",
     "FilterInputs",
     "ImuFilter",
+    "Repeats",
     "RotorNotch",
+    "SensorCheck",
+    "Unchecked",
     "Unfiltered",
 ]

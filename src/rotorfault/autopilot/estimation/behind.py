@@ -14,7 +14,7 @@ from rotorfault.maths.geometry import Vec3, zeros
 from rotorfault.maths.records import select_record
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, absolute, less, nearest
-from rotorfault.model.sensor_model import Timing
+from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
 
 
 class Moved(NamedTuple):
@@ -23,6 +23,14 @@ class Moved(NamedTuple):
     place_W: Vec3  # m
     velocity_W: Vec3  # m/s
     turn: Quat  # of the body, in its axes then
+
+
+def timing_of_fix(sensors: SensorModel) -> Timing:
+    """When position, velocity and attitude come; together, as one source gives them."""
+    for sensor in (sensors.position, sensors.velocity, sensors.attitude):
+        if isinstance(sensor, SensorNoise) and sensor.timing.every:
+            return sensor.timing
+    return Timing()
 
 
 def still() -> Moved:

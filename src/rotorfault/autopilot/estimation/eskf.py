@@ -16,7 +16,8 @@ body, so a vehicle that spins costs nothing and blurs nothing. Slow errors of po
 sensors have them, are states too (Gauss-Markov). Measurements are taken in one scalar after the other
 (`rotorfault.autopilot.estimation.covariance`), late ones against the state of the instant when they were taken
 (`rotorfault.autopilot.estimation.behind`); the corrections are applied once, at the end. What the noise is comes from
-what is believed of the sensors (`rotorfault.model.sensor_model`), nothing is tuned.
+what is believed of the sensors (`rotorfault.model.sensor_model`), nothing is tuned. With `wind` the velocity of the
+air is a state as well (`rotorfault.autopilot.estimation.air_felt`).
 
 Departures: the covariance takes the mean state over a period, and of a late measurement the lever of its velocity
 over the delay, not its history. A rate beyond the gyro's range, or that of a silent gyro, is a state that the
@@ -26,12 +27,12 @@ taken as it is, and while it is at its end the attitude blurs by `saturated`.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple, final
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.estimation import measurements
-from rotorfault.autopilot.estimation.behind import Moved, corrected, moved_on, none_yet
+from rotorfault.autopilot.estimation import air_felt, measurements
+from rotorfault.autopilot.estimation.behind import Moved, corrected, moved_on, none_yet, timing_of_fix
 from rotorfault.autopilot.estimation.covariance import Filter
 from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs, required
 from rotorfault.autopilot.estimation.start import first_attitude, first_filter
@@ -54,10 +55,10 @@ from rotorfault.maths.geometry import Mat3, Vec3, zeros
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar, absolute, exp, greater, maximum, negated, select, sqrt
 from rotorfault.model.block import Context, Record
-from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
+from rotorfault.model.sensor_model import SensorModel, SensorNoise
 from rotorfault.model.signals import Deviations, Estimate, Reading
 from rotorfault.model.slot import register
-from rotorfault.model.telemetry import BODY, NO_FRAME, WORLD, Quantity
+from rotorfault.model.telemetry import BODY, NO_FRAME, WORLD, Quantity, joined
 
 
 class EskfSignals(NamedTuple):
@@ -76,6 +77,9 @@ class EskfSignals(NamedTuple):
     measured: Annotated[Scalar, Quantity("1", NO_FRAME, "scalar measurements taken in at this instant")]
 
 
+SIGNALS_WITH_WIND = joined("EskfWindSignals", EskfSignals, air_felt.WindSignals)
+
+
 class EskfParameters(NamedTuple):
     """Numbers of the filter."""
 
@@ -85,6 +89,7 @@ class EskfParameters(NamedTuple):
     start_speed: Scalar  # m/s
     saturated: Scalar  # rad/s/sqrt(Hz)
     turning: TurningNoise | tuple[()]  # of rates that are carried on; empty if none are
+    wind: air_felt.WindNoise | tuple[()] = ()  # that is expected; empty if none is estimated
 
 
 class EskfMemory(NamedTuple):
@@ -103,22 +108,15 @@ class EskfMemory(NamedTuple):
     floor: Scalar  # m: height of the ground, as first seen and corrected since
     count: Scalar  # sampling instants so far
     unread: Unread | tuple[()] = ()  # of rates that the gyro does not tell; empty if they are taken as read
-
-
-def timing_of_fix(sensors: SensorModel) -> Timing:
-    """When position, velocity and attitude come; together, as one source gives them."""
-    for sensor in (sensors.position, sensors.velocity, sensors.attitude):
-        if isinstance(sensor, SensorNoise) and sensor.timing.every:
-            return sensor.timing
-    return Timing()
+    wind_W: Vec3 | tuple[()] = ()  # m/s; empty if it is not estimated
 
 
 @final
 @register("eskf")
 class Eskf(Estimator[EskfMemory, EskfParameters]):
-    """Error-state Kalman filter of attitude, velocity, position and biases."""
+    """Error-state Kalman filter of attitude, velocity, position and biases; of the wind if asked for."""
 
-    Telemetry = EskfSignals
+    Telemetry: ClassVar[type[Record]] = EskfSignals
 
     class Settings(Strict):
         """What no sensor tells; noise and rates are those of the sensors."""
@@ -147,19 +145,34 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             le=100.0,
             description="with `hold`: noise density of a rate beyond the gyro's range [rad/s/sqrt(Hz)]",
         )
+        wind: bool = Field(False, description="whether it estimates the wind, as the accelerometer feels it")
+        wind_at_6m: float = Field(
+            8.0, gt=0.0, description="with `wind`: mean wind 20 ft above ground that is expected, and its gusts [m/s]"
+        )
+
+    def __init__(self, settings: Any = None) -> None:
+        super().__init__(settings)
+        if self.settings.wind:
+            self.Telemetry = SIGNALS_WITH_WIND  # type: ignore[misc]  # of an estimator with it
+
+    @property
+    def carries_rates_on(self) -> bool:
+        """Whether rates that are not read are carried on by the believed motion."""
+        return bool(self.settings.beyond_range == "model")
 
     @property
     def asks_for_thrust(self) -> bool:
-        """Whether it carries rates on by the thrust of the believed rotors."""
-        return bool(self.settings.beyond_range == "model")
+        """Whether it goes by the thrust of the believed rotors: for rates that are not read, and for the wind."""
+        return self.carries_rates_on or bool(self.settings.wind)
 
     def parameters(self, context: Context) -> EskfParameters:
         """What is believed of the sensors, and the settings."""
         sensors, s = context.sensors, self.settings
         if not isinstance(sensors, SensorModel):
             sensors = SensorModel()
-        turning = turning_noise(context.vehicle, s.unknown_torque) if self.asks_for_thrust else ()
-        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning)
+        turning = turning_noise(context.vehicle, s.unknown_torque) if self.carries_rates_on else ()
+        wind = air_felt.wind_noise(context.vehicle, s.wind_at_6m) if s.wind else ()
+        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning, wind)
 
     def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:
         """From the first readings alone."""
@@ -169,16 +182,22 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         velocity = readings.velocity
         force = required(readings, "specific_force", "eskf").value
         q_WB = first_attitude(readings, sensors)
-        filter_ = first_filter(readings, sensors, q_WB, parameters.start_tilt, parameters.start_speed, gravity)
+        states = self._states(sensors)
+        tilt, speed, wind = parameters.start_tilt, parameters.start_speed, parameters.wind
+        filter_ = first_filter(readings, sensors, states, q_WB, tilt, speed, gravity)
+        v_W = velocity.value if isinstance(velocity, Reading) else zeros()
+        wind_W: Vec3 | tuple[()] = ()
+        if isinstance(wind, air_felt.WindNoise):
+            wind_W = air_felt.first_wind(filter_, states.wind, wind, v_W, q_WB.matrix(), force, inputs)
         distance = readings.range
         floor = position.z - distance.value * q_WB.z_axis().z if isinstance(distance, Reading) else 0.0
         return EskfMemory(
             position,
-            velocity.value if isinstance(velocity, Reading) else zeros(),
+            v_W,
             q_WB,
             zeros(),
             zeros(),
-            States.of(sensors).no_slow_errors(),
+            states.no_slow_errors(),
             filter_.triangle,
             required(readings, "rates", "eskf").value,
             q_WB.matrix() @ force,
@@ -186,16 +205,20 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             floor,
             0.0,
             all_read(_noise(sensors.rates).bias, inputs.believed_thrust, inputs.vehicle)
-            if self.asks_for_thrust
+            if self.carries_rates_on
             else (),
+            wind_W,
         )
+
+    def _states(self, sensors: SensorModel) -> States:
+        return States.of(sensors, self.settings.wind)
 
     def step(
         self, memory: EskfMemory, inputs: EstimatorInputs, parameters: EskfParameters, dt: Scalar
     ) -> tuple[EskfMemory, Estimate, Record]:
         """Carry on by the inertial readings, then take in what has arrived."""
         sensors, readings = _known(parameters.sensors), inputs.readings
-        states = States.of(sensors)
+        states = self._states(sensors)
         running = greater(memory.count, 0.5)  # at the first instant no time has gone by, and all is read already
         spell = dt * running
         gyro = required(readings, "rates", "eskf")
@@ -219,12 +242,22 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         moved = (memory.v_W + gained * 0.5) * spell
         p_W, v_W = memory.p_W + moved, memory.v_W + gained
         filter_ = Filter(memory.covariance, states.number)
-        slow = self._predict(filter_, memory, parameters, R, mean_W, spell, running, gyro, unread, drift)
+        slow = self._predict(filter_, memory, parameters, states, R, mean_W, spell, running, gyro, unread, drift)
+        wind_W = memory.wind_W
+        if isinstance(wind_W, Vec3) and isinstance(parameters.wind, air_felt.WindNoise):
+            wind_W = air_felt.blown_on(filter_, states.wind, wind_W, parameters.wind, parameters.period, running)
+            air_felt.with_attitude(filter_, states.wind, wind_W, -1.0)
         timing = timing_of_fix(sensors)
         behind = moved_on(memory.behind, moved, gained, turn, timing, memory.count)
         belief = measurements.Belief(p_W, v_W, q_WB, R, rates, slow, memory.floor, gravity)
         then = behind[-1] if behind else None
         innovation = measurements.take_in(filter_, readings, sensors, states, belief, then, timing.late * dt, running)
+        if isinstance(wind_W, Vec3):
+            air_felt.feel(
+                filter_, states.wind, wind_W, v_W, R, rates, force, required(readings, "specific_force", "eskf"),
+                _noise(sensors.specific_force), inputs.vehicle, inputs.believed_thrust, running,
+            )  # fmt: skip
+            wind_W = air_felt.corrected(filter_, states.wind, wind_W)
 
         error = filter_.error
         speed = _three(error, V)
@@ -251,10 +284,11 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             moving
             if unread is None or not isinstance(moving, Unread)
             else kept(filter_, moving, unread, _noise(sensors.rates).bias_walk, spell),
+            wind_W,
         )
-        deviations = self._deviations(filter_, sensors, after.unread)
+        deviations = self._deviations(filter_, sensors, states, after.unread)
         estimate = Estimate(
-            after.p_W, after.v_W, q_WB, rates, force,
+            after.p_W, after.v_W, q_WB, rates, force, wind_W,
             gyro_bias=gyro_bias, accelerometer_bias=force_bias, std=deviations,
         )  # fmt: skip
         signals = EskfSignals(
@@ -262,12 +296,14 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             gyro_bias, _there(deviations.gyro_bias), force_bias, _there(deviations.accelerometer_bias),
             innovation, filter_.squares, filter_.measured,
         )  # fmt: skip
-        return after, estimate, signals
+        if wind_W == ():
+            return after, estimate, signals
+        return after, estimate, SIGNALS_WITH_WIND(*signals, wind_W, deviations.wind_W)
 
     @staticmethod
     def _predict(
-        filter_: Filter, memory: EskfMemory, parameters: EskfParameters, R: Mat3, force_W: Vec3, spell: Scalar,
-        running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None, drift: Vec3 | None,
+        filter_: Filter, memory: EskfMemory, parameters: EskfParameters, states: States, R: Mat3, force_W: Vec3,
+        spell: Scalar, running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None, drift: Vec3 | None,
     ) -> tuple[Any, ...]:  # fmt: skip
         """The covariance a period later, and the slow errors."""
         sensors = parameters.sensors
@@ -299,7 +335,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             filter_.blur(FORCE_BIAS + i, force.bias_walk * force.bias_walk * spell)
             filter_.blur(GYRO_BIAS + i, walks_by * spell)
         slow = []
-        for group, value in zip(States.of(sensors).slow, memory.slow, strict=True):
+        for group, value in zip(states.slow, memory.slow, strict=True):
             noise = group.noise
             # What counts is the error of the reading that arrives now; the first was taken at the start.
             late = noise.timing.late
@@ -312,7 +348,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         return tuple(slow)
 
     @staticmethod
-    def _deviations(filter_: Filter, sensors: SensorModel, unread: Any) -> Deviations:
+    def _deviations(filter_: Filter, sensors: SensorModel, states: States, unread: Any) -> Deviations:
         """Standard deviations of what is estimated."""
         rates, force = _noise(sensors.rates), _noise(sensors.specific_force)
 
@@ -323,8 +359,9 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         felt = force.std * force.std + 0.5 * force.vibration * force.vibration
         bias = std(GYRO_BIAS) if unread == () else unread.bias_variance.map(lambda one: sqrt(maximum(one, 0.0)))
         return Deviations(
-            std(P), std(V), std(ERROR), std(GYRO_BIAS, gyro), std(FORCE_BIAS, felt), bias, std(FORCE_BIAS)
-        )
+            std(P), std(V), std(ERROR), std(GYRO_BIAS, gyro), std(FORCE_BIAS, felt), bias, std(FORCE_BIAS),
+            std(states.wind[0]) if states.wind else (),
+        )  # fmt: skip
 
 
 def turn_by(rotation: Vec3) -> Quat:

@@ -19,7 +19,7 @@ from rotorfault.model.vehicle import Vehicle
 class FilterInputs(NamedTuple):
     """All that a filter may use at one sampling instant."""
 
-    readings: Readings  # as the sensors give them
+    readings: Readings  # as the sensors give them; those not valid that are held for frozen
     rotors: RotorModel  # N: what sound rotors give
     speed: PerRotor  # rad/s: believed of sound rotors now, by the commands that were sent
     sped: PerRotor  # rad/s: by which that has changed over the last period
@@ -52,7 +52,7 @@ def behind(between: ImuFilter[Any, Any] | None, sensors: SensorModel, context: C
 
 def _inputs(instant: Instant) -> FilterInputs:
     speed = instant.speed
-    return FilterInputs(instant.read, instant.past.rotors, speed, speed - instant.past.speed, instant.vehicle)
+    return FilterInputs(instant.checked, instant.past.rotors, speed, speed - instant.past.speed, instant.vehicle)
 
 
 IMU_FILTER = Slot(

@@ -52,7 +52,13 @@ def first_attitude(readings: Readings, sensors: SensorModel) -> Quat:
 
 
 def first_filter(
-    readings: Readings, sensors: SensorModel, q_WB: Quat, tilt: Scalar, speed: Scalar, gravity: Scalar
+    readings: Readings,
+    sensors: SensorModel,
+    states: States,
+    q_WB: Quat,
+    tilt: Scalar,
+    speed: Scalar,
+    gravity: Scalar,
 ) -> Filter:
     """The covariance at the first instant.
 
@@ -60,13 +66,13 @@ def first_filter(
     ----------
     readings : Readings
     sensors : SensorModel
+    states : States
     q_WB : Quat
         From `first_attitude`.
     tilt, speed : scalar, rad and m/s
         Standard deviations of what no sensor tells.
     gravity : scalar, m/s^2
     """
-    states = States.of(sensors)
     position, force, rates = sensors.position, sensors.specific_force, sensors.rates
     assert isinstance(position, SensorNoise)
     assert isinstance(force, SensorNoise)

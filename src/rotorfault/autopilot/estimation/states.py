@@ -1,4 +1,4 @@
-"""The error states of the Kalman filter, in order: fifteen, and slow errors where sensors have them."""
+"""The error states of the Kalman filter, in order: fifteen, then slow errors, ground and wind where there are any."""
 
 from __future__ import annotations
 
@@ -26,19 +26,21 @@ class States(NamedTuple):
     number: int
     slow: tuple[SlowError, ...]
     floor: int | None = None  # height of the ground, where the distance to it is measured
+    wind: tuple[int, ...] = ()  # of its velocity along x, y, z of the world, where that is estimated
 
     @classmethod
-    def of(cls, sensors: SensorModel) -> States:
-        """Of a set of sensors as believed."""
+    def of(cls, sensors: SensorModel, wind: bool = False) -> States:
+        """Of a set of sensors as believed, and of the wind if that is wanted."""
         slow, used = [], BASIC
         for name, width in (("position", 3), ("pressure_altitude", 1)):
             noise = getattr(sensors, name)
             if isinstance(noise, SensorNoise) and not isinstance(noise.wander, tuple):
                 slow.append(SlowError(name, tuple(range(used, used + width)), noise))
                 used += width
-        if isinstance(sensors.range, SensorNoise):
-            return cls(used + 1, tuple(slow), used)
-        return cls(used, tuple(slow))
+        floor = used if isinstance(sensors.range, SensorNoise) else None
+        used += 0 if floor is None else 1
+        blown = tuple(range(used, used + 3)) if wind else ()
+        return cls(used + len(blown), tuple(slow), floor, blown)
 
     def no_slow_errors(self) -> tuple[Any, ...]:
         """The slow errors at the start, from which they are counted."""
