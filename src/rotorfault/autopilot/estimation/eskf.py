@@ -22,21 +22,24 @@ air is a state as well (`rotorfault.autopilot.estimation.air_felt`).
 Departures: the covariance takes the mean state over a period, and of a late measurement the lever of its velocity
 over the delay, not its history. A rate beyond the gyro's range, or that of a silent gyro, is a state that the
 believed motion carries on (`rotorfault.autopilot.estimation.unread`); with `beyond_range = "hold"` the reading is
-taken as it is, and while it is at its end the attitude blurs by `saturated`.
+taken as it is, and while it is at its end the attitude blurs by `saturated`. The force of a silent accelerometer is
+carried on likewise (`rotorfault.autopilot.estimation.unfelt`).
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, final
+from typing import Any, ClassVar, Literal, NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.autopilot.estimation import air_felt, measurements
 from rotorfault.autopilot.estimation.behind import Moved, corrected, moved_on, none_yet, timing_of_fix
 from rotorfault.autopilot.estimation.covariance import Filter
+from rotorfault.autopilot.estimation.eskf_signals import SIGNALS_WITH_WIND, EskfSignals
 from rotorfault.autopilot.estimation.protocol import Estimator, EstimatorInputs, required
 from rotorfault.autopilot.estimation.start import first_attitude, first_filter
 from rotorfault.autopilot.estimation.states import ERROR, FORCE_BIAS, GYRO_BIAS, P, States, V
+from rotorfault.autopilot.estimation.unfelt import Unfelt, all_felt, force_of, unfelt_noise
 from rotorfault.autopilot.estimation.unread import (
     AT_END,
     TurningNoise,
@@ -47,6 +50,7 @@ from rotorfault.autopilot.estimation.unread import (
     kept,
     not_read,
     rate_of,
+    spoken,
     turning_noise,
 )
 from rotorfault.base.config import Strict
@@ -58,26 +62,6 @@ from rotorfault.model.block import Context, Record
 from rotorfault.model.sensor_model import SensorModel, SensorNoise
 from rotorfault.model.signals import Deviations, Estimate, Reading
 from rotorfault.model.slot import register
-from rotorfault.model.telemetry import BODY, NO_FRAME, WORLD, Quantity, joined
-
-
-class EskfSignals(NamedTuple):
-    """How well the filter believes to know, and what measurements say of that."""
-
-    position_std: Annotated[Vec3, Quantity("m", WORLD, "standard deviation of the estimated position")]
-    velocity_std: Annotated[Vec3, Quantity("m/s", WORLD, "standard deviation of the estimated velocity")]
-    attitude_std: Annotated[Vec3, Quantity("rad", WORLD, "its standard deviation, about the world's axes")]
-    rates_std: Annotated[Vec3, Quantity("rad/s", BODY, "standard deviation of the estimated rates")]
-    gyro_bias: Annotated[Vec3, Quantity("rad/s", BODY, "estimated bias of the gyro")]
-    gyro_bias_std: Annotated[Vec3, Quantity("rad/s", BODY, "its standard deviation")]
-    accelerometer_bias: Annotated[Vec3, Quantity("m/s^2", BODY, "estimated bias of the accelerometer")]
-    accelerometer_bias_std: Annotated[Vec3, Quantity("m/s^2", BODY, "its standard deviation")]
-    innovation: Annotated[Vec3, Quantity("m", WORLD, "measured less predicted position; 0 without a measurement")]
-    nis: Annotated[Scalar, Quantity("1", NO_FRAME, "normalised innovations squared, summed over this instant")]
-    measured: Annotated[Scalar, Quantity("1", NO_FRAME, "scalar measurements taken in at this instant")]
-
-
-SIGNALS_WITH_WIND = joined("EskfWindSignals", EskfSignals, air_felt.WindSignals)
 
 
 class EskfParameters(NamedTuple):
@@ -89,6 +73,7 @@ class EskfParameters(NamedTuple):
     start_speed: Scalar  # m/s
     saturated: Scalar  # rad/s/sqrt(Hz)
     turning: TurningNoise | tuple[()]  # of rates that are carried on; empty if none are
+    unfelt: Scalar = 0.0  # m/s^2/sqrt(Hz): of a specific force that is carried on
     wind: air_felt.WindNoise | tuple[()] = ()  # that is expected; empty if none is estimated
 
 
@@ -108,6 +93,7 @@ class EskfMemory(NamedTuple):
     floor: Scalar  # m: height of the ground, as first seen and corrected since
     count: Scalar  # sampling instants so far
     unread: Unread | tuple[()] = ()  # of rates that the gyro does not tell; empty if they are taken as read
+    unfelt: Unfelt | tuple[()] = ()  # of a silent accelerometer; empty if it is taken as read
     wind_W: Vec3 | tuple[()] = ()  # m/s; empty if it is not estimated
 
 
@@ -129,15 +115,15 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         )
         beyond_range: Literal["model", "hold"] = Field(
             "model",
-            description="a rate beyond the gyro's range, or of a silent gyro: `model` carries it on by the believed "
-            "motion, `hold` takes it as it is read",
+            description="a rate beyond the gyro's range, or what a silent gyro or accelerometer does not read: "
+            "`model` carries it on by the believed motion, `hold` takes it as it is read",
         )
         unknown_torque: float = Field(
             0.1,
             gt=0.0,
             le=10.0,
-            description="with `model`: error of the believed torque over those of the rotors in hover; our estimate: "
-            "what thrust and drag of a rotor are known to",
+            description="with `model`: error of the believed torque or thrust over those of the rotors in hover; our "
+            "estimate: what thrust and drag of a rotor are known to",
         )
         saturated: float = Field(
             0.3,
@@ -156,35 +142,38 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             self.Telemetry = SIGNALS_WITH_WIND  # type: ignore[misc]  # of an estimator with it
 
     @property
-    def carries_rates_on(self) -> bool:
-        """Whether rates that are not read are carried on by the believed motion."""
+    def carries_on(self) -> bool:
+        """Whether rates and specific force that are not read are carried on by the believed motion."""
         return bool(self.settings.beyond_range == "model")
 
     @property
     def asks_for_thrust(self) -> bool:
-        """Whether it goes by the thrust of the believed rotors: for rates that are not read, and for the wind."""
-        return self.carries_rates_on or bool(self.settings.wind)
+        """Whether it goes by the thrust of the believed rotors: for what is not read, and for the wind."""
+        return self.carries_on or bool(self.settings.wind)
 
     def parameters(self, context: Context) -> EskfParameters:
         """What is believed of the sensors, and the settings."""
         sensors, s = context.sensors, self.settings
         if not isinstance(sensors, SensorModel):
             sensors = SensorModel()
-        turning = turning_noise(context.vehicle, s.unknown_torque) if self.carries_rates_on else ()
+        turning = turning_noise(context.vehicle, s.unknown_torque) if self.carries_on else ()
+        unfelt = unfelt_noise(context.vehicle, s.unknown_torque)
         wind = air_felt.wind_noise(context.vehicle, s.wind_at_6m) if s.wind else ()
-        return EskfParameters(sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning, wind)
+        return EskfParameters(
+            sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning, unfelt, wind
+        )
 
     def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:
         """From the first readings alone."""
         sensors = _known(parameters.sensors)
-        readings, gravity = inputs.readings, inputs.vehicle.gravity
+        readings, vehicle, thrust = inputs.readings, inputs.vehicle, inputs.believed_thrust
         position = required(readings, "position", "eskf").value
         velocity = readings.velocity
         force = required(readings, "specific_force", "eskf").value
         q_WB = first_attitude(readings, sensors)
         states = self._states(sensors)
         tilt, speed, wind = parameters.start_tilt, parameters.start_speed, parameters.wind
-        filter_ = first_filter(readings, sensors, states, q_WB, tilt, speed, gravity)
+        filter_ = first_filter(readings, sensors, states, q_WB, tilt, speed, vehicle.gravity)
         v_W = velocity.value if isinstance(velocity, Reading) else zeros()
         wind_W: Vec3 | tuple[()] = ()
         if isinstance(wind, air_felt.WindNoise):
@@ -204,9 +193,8 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             none_yet(timing_of_fix(sensors)),
             floor,
             0.0,
-            all_read(_noise(sensors.rates).bias, inputs.believed_thrust, inputs.vehicle)
-            if self.carries_rates_on
-            else (),
+            all_read(_noise(sensors.rates), thrust, vehicle) if self.carries_on else (),
+            all_felt(force, _noise(sensors.specific_force).timing, vehicle, thrust) if self.carries_on else (),
             wind_W,
         )
 
@@ -218,31 +206,37 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
     ) -> tuple[EskfMemory, Estimate, Record]:
         """Carry on by the inertial readings, then take in what has arrived."""
         sensors, readings = _known(parameters.sensors), inputs.readings
-        states = self._states(sensors)
+        states, vehicle, thrust = self._states(sensors), inputs.vehicle, inputs.believed_thrust
         running = greater(memory.count, 0.5)  # at the first instant no time has gone by, and all is read already
         spell = dt * running
         gyro = required(readings, "rates", "eskf")
         rates, unread, moving, drift = gyro.value - memory.gyro_bias, None, memory.unread, None
         if isinstance(memory.unread, Unread) and isinstance(parameters.turning, TurningNoise):
-            at_end, unread = not_read(gyro, _noise(sensors.rates))
-            thrust = inputs.believed_thrust
-            carried, slower, moving = carried_on(memory.unread, memory.rates, thrust, inputs.vehicle, spell)
-            drift = parameters.turning.drift(slower, dt)
+            there, waited = spoken(gyro, memory.unread.waited, _noise(sensors.rates).timing)
+            at_end, unread = not_read(gyro, there, _noise(sensors.rates))
+            carried, slower, moving = carried_on(memory.unread, memory.rates, thrust, vehicle, spell)
+            moving, drift = moving._replace(waited=waited), parameters.turning.drift(slower, dt)
             rates = rate_of(rates, carried, gyro.value, at_end, unread)
-        force = required(readings, "specific_force", "eskf").value - memory.force_bias
-        force = force - rates.cross(rates.cross(sensors.imu_at_B))
+        felt, silent, unfelt = required(readings, "specific_force", "eskf"), 0.0, memory.unfelt
+        force = felt.value - memory.force_bias - rates.cross(rates.cross(sensors.imu_at_B))
+        if isinstance(unfelt, Unfelt):
+            force, silent, unfelt = force_of(
+                unfelt, force, felt, _noise(sensors.specific_force).timing, vehicle, thrust
+            )
         # The mean of both ends of the period, which is what a sampled reading stands for.
         turn = turn_by((memory.rates + rates) * (0.5 * spell))
         q_WB = (memory.q_WB @ turn).normalised()
         R = q_WB.matrix()
         force_W = R @ force
         mean_W = (memory.force_W + force_W) * 0.5
-        gravity = inputs.vehicle.gravity
+        gravity = vehicle.gravity
         gained = (mean_W - Vec3(0.0, 0.0, gravity)) * spell
         moved = (memory.v_W + gained * 0.5) * spell
         p_W, v_W = memory.p_W + moved, memory.v_W + gained
         filter_ = Filter(memory.covariance, states.number)
-        slow = self._predict(filter_, memory, parameters, states, R, mean_W, spell, running, gyro, unread, drift)
+        slow = self._predict(
+            filter_, memory, parameters, states, R, mean_W, spell, running, gyro, unread, drift, silent
+        )
         wind_W = memory.wind_W
         if isinstance(wind_W, Vec3) and isinstance(parameters.wind, air_felt.WindNoise):
             wind_W = air_felt.blown_on(filter_, states.wind, wind_W, parameters.wind, parameters.period, running)
@@ -254,8 +248,8 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         innovation = measurements.take_in(filter_, readings, sensors, states, belief, then, timing.late * dt, running)
         if isinstance(wind_W, Vec3):
             air_felt.feel(
-                filter_, states.wind, wind_W, v_W, R, rates, force, required(readings, "specific_force", "eskf"),
-                _noise(sensors.specific_force), inputs.vehicle, inputs.believed_thrust, running,
+                filter_, states.wind, wind_W, v_W, R, rates, force, felt, _noise(sensors.specific_force), vehicle,
+                thrust, running,
             )  # fmt: skip
             wind_W = air_felt.corrected(filter_, states.wind, wind_W)
 
@@ -267,7 +261,8 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         if unread is not None:
             rates, off = rates - off.times(unread), off.times(unread.map(negated))
         gyro_bias = memory.gyro_bias + off
-        force_bias = memory.force_bias + _three(error, FORCE_BIAS)
+        still_off = _three(error, FORCE_BIAS)
+        force_bias = memory.force_bias + still_off
         after = EskfMemory(
             p_W + _three(error, P),
             v_W + speed,
@@ -284,6 +279,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             moving
             if unread is None or not isinstance(moving, Unread)
             else kept(filter_, moving, unread, _noise(sensors.rates).bias_walk, spell),
+            unfelt._replace(force_B=force - still_off) if isinstance(unfelt, Unfelt) else (),
             wind_W,
         )
         deviations = self._deviations(filter_, sensors, states, after.unread)
@@ -304,6 +300,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
     def _predict(
         filter_: Filter, memory: EskfMemory, parameters: EskfParameters, states: States, R: Mat3, force_W: Vec3,
         spell: Scalar, running: Scalar, gyro: Reading[Vec3], unread: Vec3 | None, drift: Vec3 | None,
+        silent: Scalar,
     ) -> tuple[Any, ...]:  # fmt: skip
         """The covariance a period later, and the slow errors."""
         sensors = parameters.sensors
@@ -329,8 +326,9 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
             walks = Vec3(walk, walk, walk)
         else:
             walks = Vec3.of(select(on, made, walk) for on, made in zip(unread, drift, strict=True))
+        guessed = silent * parameters.unfelt * parameters.unfelt
         for i, walks_by in enumerate(walks):
-            filter_.blur(V + i, force.std * force.std * force.timing.every * spell * spell)
+            filter_.blur(V + i, (force.std * force.std * force.timing.every * spell + guessed) * spell)
             filter_.blur(ERROR + i, blur * spell)
             filter_.blur(FORCE_BIAS + i, force.bias_walk * force.bias_walk * spell)
             filter_.blur(GYRO_BIAS + i, walks_by * spell)

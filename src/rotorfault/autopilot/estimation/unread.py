@@ -24,16 +24,16 @@ error of one such rate changes another by gyroscopic torques, and that the air d
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rotorfault.autopilot.estimation.covariance import Filter
 from rotorfault.autopilot.estimation.states import GYRO_BIAS
 from rotorfault.base.one_line import record_line
 from rotorfault.maths.geometry import PerRotor, Vec3, spread, zeros
-from rotorfault.maths.scalar import Scalar, absolute, greater, greater_equal, maximum, minimum, select, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, greater, greater_equal, less, maximum, minimum, select, sqrt
 from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import angular_acceleration, mean_bandwidth, torque_of_turning
-from rotorfault.model.sensor_model import SensorNoise
+from rotorfault.model.sensor_model import SensorNoise, Timing
 from rotorfault.model.signals import Reading
 from rotorfault.model.vehicle import (
     Vehicle,
@@ -54,23 +54,24 @@ class Unread(NamedTuple):
     bias_variance: Vec3  # (rad/s)^2: of the gyro's biases
     turning: Vec3  # rad/s^2: believed angular acceleration at the last instant
     against: Scalar | Vec3  # rad/s: by which the body turns slower for the momentum of the believed rotors
+    waited: Scalar | tuple[()] = ()  # instants since the last reading; empty of a gyro that measures at every one
 
 
-def all_read(bias: Scalar, thrust: PerRotor, vehicle: Vehicle) -> Unread:
+def all_read(gyro: SensorNoise, thrust: PerRotor, vehicle: Vehicle) -> Unread:
     """Before the first instant.
 
     Parameters
     ----------
-    bias : scalar, rad/s
-        Standard deviation of the gyro's bias at the start.
+    gyro : SensorNoise
+        As believed.
     thrust : PerRotor, N
         Of the believed rotors.
     vehicle : Vehicle
         As believed.
     """
-    variance = bias * bias
+    variance = gyro.bias * gyro.bias
     against = turn_against_rotors(vehicle, residual_speed(vehicle, rotor_speeds(vehicle, thrust)))
-    return Unread(zeros(), Vec3(variance, variance, variance), zeros(), against)
+    return Unread(zeros(), Vec3(variance, variance, variance), zeros(), against, none_awaited(gyro.timing))
 
 
 class TurningNoise(NamedTuple):
@@ -115,18 +116,42 @@ def turning_noise(vehicle: Vehicle, share: Scalar) -> TurningNoise:
     return TurningNoise(size * lasting, lasting)
 
 
-def not_read(gyro: Reading[Vec3], noise: SensorNoise) -> tuple[Vec3, Vec3]:
+def none_awaited(timing: Timing) -> Scalar | tuple[()]:
+    """What `spoken` needs to remember before the first instant: nothing of a sensor that measures at every one."""
+    return 0.0 if timing.every > 1 else ()
+
+
+def spoken(reading: Reading[Any], waited: Scalar | tuple[()], timing: Timing) -> tuple[Scalar, Scalar | tuple[()]]:
+    """1 unless a sensor is silent, whose last reading stands until the next is due; and how long it has stood.
+
+    Parameters
+    ----------
+    reading : Reading
+    waited : scalar, or empty
+        Instants since the last reading, before this one.
+    timing : Timing
+        Of the sensor.
+    """
+    if isinstance(waited, tuple):
+        return reading.valid, ()
+    waits = (waited + 1.0) * (1.0 - reading.valid)
+    return less(waits, timing.every - 0.5), waits
+
+
+def not_read(gyro: Reading[Vec3], there: Scalar, noise: SensorNoise) -> tuple[Vec3, Vec3]:
     """For each axis 1 if its reading is at the end of the range, and 1 if it tells no rate.
 
     Parameters
     ----------
     gyro : Reading of Vec3, rad/s
+    there : scalar
+        Of `spoken`.
     noise : SensorNoise
         Of the gyro, as believed.
     """
     limit = noise.limit * AT_END
-    at_end = gyro.value.map(lambda one: greater_equal(absolute(one), limit) * gyro.valid)
-    return at_end, at_end.map(lambda one: 1.0 - (1.0 - one) * gyro.valid)
+    at_end = gyro.value.map(lambda one: greater_equal(absolute(one), limit) * there)
+    return at_end, at_end.map(lambda one: 1.0 - (1.0 - one) * there)
 
 
 def carried_on(
