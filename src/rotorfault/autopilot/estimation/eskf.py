@@ -74,7 +74,8 @@ class EskfParameters(NamedTuple):
     saturated: Scalar  # rad/s/sqrt(Hz)
     turning: TurningNoise | tuple[()]  # of rates that are carried on; empty if none are
     unfelt: Scalar = 0.0  # m/s^2/sqrt(Hz): of a specific force that is carried on
-    wind: air_felt.WindNoise | tuple[()] = ()  # that is expected; empty if none is estimated
+    wind_at_6m: Scalar = 0.0  # m/s: that is expected, estimated or not
+    wind: air_felt.WindNoise | tuple[()] = ()  # what follows from it; empty if none is estimated
 
 
 class EskfMemory(NamedTuple):
@@ -160,7 +161,7 @@ class Eskf(Estimator[EskfMemory, EskfParameters]):
         unfelt = unfelt_noise(context.vehicle, s.unknown_torque)
         wind = air_felt.wind_noise(context.vehicle, s.wind_at_6m) if s.wind else ()
         return EskfParameters(
-            sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning, unfelt, wind
+            sensors, context.period, s.start_tilt, s.start_speed, s.saturated, turning, unfelt, s.wind_at_6m, wind
         )
 
     def initial(self, inputs: EstimatorInputs, parameters: EskfParameters) -> EskfMemory:

@@ -87,6 +87,15 @@ class Looked(NamedTuple):
     end: Scalar  # of the range, in the unit of the reading
 
 
+class RepeatsParameters(NamedTuple):
+    """Numbers of the check."""
+
+    rate: Scalar  # 1/h
+    each: tuple[
+        Looked | tuple[()], ...
+    ]  # for each field of `Readings`; empty where nothing is known, or it comes once
+
+
 class Seen(NamedTuple):
     """What has been read of a sensor."""
 
@@ -103,7 +112,7 @@ class RepeatsSignals(NamedTuple):
 
 @final
 @register("repeats")
-class Repeats(SensorCheck[tuple[Any, ...], tuple[Any, ...]]):
+class Repeats(SensorCheck[tuple[Any, ...], RepeatsParameters]):
     """A reading that repeats to the last bit for longer than its noise allows is held for frozen."""
 
     Telemetry = RepeatsSignals
@@ -115,10 +124,11 @@ class Repeats(SensorCheck[tuple[Any, ...], tuple[Any, ...]]):
             0.01, gt=0.0, le=3600.0, description="readings of each sensor held for frozen by chance, at most [1/h]"
         )
 
-    def parameters(self, context: Context) -> tuple[Any, ...]:
-        """For each field of `Readings`: numbers, or nothing where it is not known or comes once."""
+    def parameters(self, context: Context) -> RepeatsParameters:
+        """What each sensor's noise and rate make of the wanted rate."""
         sensors = context.sensors if isinstance(context.sensors, SensorModel) else SensorModel()
-        return tuple(self._looked(getattr(sensors, name), context.period) for name in Readings._fields)
+        each = tuple(self._looked(getattr(sensors, name), context.period) for name in Readings._fields)
+        return RepeatsParameters(self.settings.rate, each)
 
     def _looked(self, noise: SensorNoise | tuple[()], period: float) -> Looked | tuple[()]:
         if not isinstance(noise, SensorNoise) or noise.timing.every == 0:
@@ -127,21 +137,21 @@ class Repeats(SensorCheck[tuple[Any, ...], tuple[Any, ...]]):
         needed = math.log(readings / self.settings.rate) / LIKELIEST
         return Looked(max(needed, 1.0) if float(noise.std) > 0.0 else math.inf, noise.limit)
 
-    def initial(self, inputs: CheckInputs, parameters: tuple[Any, ...]) -> tuple[Any, ...]:
+    def initial(self, inputs: CheckInputs, parameters: RepeatsParameters) -> tuple[Any, ...]:
         """The first values, which are read once more at the first instant."""
         return tuple(
             Seen(reading.value, -_freedom(reading.value), 0.0)
             if isinstance(reading, Reading) and isinstance(looked, Looked)
             else ()
-            for reading, looked in zip(inputs.readings, parameters, strict=True)
+            for reading, looked in zip(inputs.readings, parameters.each, strict=True)
         )
 
     def step(
-        self, memory: tuple[Any, ...], inputs: CheckInputs, parameters: tuple[Any, ...], dt: Scalar
+        self, memory: tuple[Any, ...], inputs: CheckInputs, parameters: RepeatsParameters, dt: Scalar
     ) -> tuple[tuple[Any, ...], Readings, Record]:
         """One sampling instant."""
         given, after, count = dict(inputs.readings._asdict()), [], 0.0
-        for name, seen, looked in zip(Readings._fields, memory, parameters, strict=True):
+        for name, seen, looked in zip(Readings._fields, memory, parameters.each, strict=True):
             if not (isinstance(seen, Seen) and isinstance(looked, Looked)):
                 after.append(())
                 continue
