@@ -150,7 +150,8 @@ class Repeats(SensorCheck[tuple[Any, ...], RepeatsParameters]):
         self, memory: tuple[Any, ...], inputs: CheckInputs, parameters: RepeatsParameters, dt: Scalar
     ) -> tuple[tuple[Any, ...], Readings, Record]:
         """One sampling instant."""
-        given, after, count = dict(inputs.readings._asdict()), [], 0.0
+        given, count = dict(inputs.readings._asdict()), 0.0
+        after: list[Any] = []
         for name, seen, looked in zip(Readings._fields, memory, parameters.each, strict=True):
             if not (isinstance(seen, Seen) and isinstance(looked, Looked)):
                 after.append(())
