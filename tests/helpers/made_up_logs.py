@@ -93,6 +93,14 @@ def log_of(flight: Flown, name: str = "made-up") -> Log:
     return Log(name, "made up", named_layout(flight.frame, "a test"), series)
 
 
+def level(log: Log) -> Log:
+    """The log with a level attitude."""
+    time = log.series["command"].time
+    still = np.zeros((len(time), 4))
+    still[:, 0] = 1.0
+    return Log(log.source, log.kind, log.layout, {**log.series, "attitude": Series(time, still)})
+
+
 def write_csv(flight: Flown, path: Path, says: str | None = None) -> Path:
     """The flight as our documented table; above it stands its frame, or what else it is to say."""
     count = flight.command.shape[1]

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from made_up_logs import flown, log_of
+from made_up_logs import flown, level, log_of
 
 from rotorfault.base.errors import InputError
 from rotorfault.logs.api import write_pages
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import diagnosis_of
-from rotorfault.logs.log import Log, Series, named_layout
+from rotorfault.logs.log import Log, named_layout
 from rotorfault.logs.page import data_of
 from rotorfault.model.vehicle_file import load_vehicle
-
-
-def level(log: Log) -> Log:
-    """The log with a level attitude."""
-    time = log.series["command"].time
-    still = np.zeros((len(time), 4))
-    still[:, 0] = 1.0
-    return Log(log.source, log.kind, log.layout, {**log.series, "attitude": Series(time, still)})
 
 
 def test_a_page_has_the_verdict_and_the_evidence_against_each_rotor(tmp_path: Path) -> None:

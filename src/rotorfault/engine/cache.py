@@ -55,15 +55,16 @@ def key(loop: ClosedLoop, compiler: str, form: str) -> str | None:
     """
     if foreign(loop):
         return None
-    return _digest(source_digest(), compiler, form, *structure(loop))
+    return digest_of(source_digest(), compiler, form, *structure(loop))
 
 
 def key_of_program(text: str, compiler: str) -> str:
     """Name of what a program is compiled to."""
-    return _digest("program", compiler, text)
+    return digest_of("program", compiler, text)
 
 
-def _digest(*words: str) -> str:
+def digest_of(*words: str) -> str:
+    """A name that these words alone have."""
     return hashlib.sha256("\n".join(words).encode()).hexdigest()
 
 

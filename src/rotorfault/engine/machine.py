@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple, final
 
 import numpy as np
@@ -71,16 +72,36 @@ class Machines(NamedTuple):
         if name is None:
             written = self._written(with_signals)
             name = cache.key_of_program(written.text, native.compiler())
-        if name not in _LOADED:
-            _LOADED[name] = Machine(cache.get(name, lambda: _compiled(written or self._written(with_signals))))
-        return _LOADED[name]
+        return loaded(name, lambda: compiled(written or self._written(with_signals), "the closed loop"))
 
     def _written(self, with_signals: bool) -> Program:
         return program(trace(self.batch, same_for_all(self.batch)), native.lanes(), with_signals)
 
 
-def _compiled(written: Program) -> Compiled:
-    with Busy("compiling the closed loop (once for its parts, then kept)"):
+def loaded(name: str, make: Callable[[], Compiled]) -> Machine:
+    """The machine of this name, loaded once; what it runs is made if it is not kept.
+
+    Parameters
+    ----------
+    name : str
+    make : callable
+        Compiles it.
+    """
+    if name not in _LOADED:
+        _LOADED[name] = Machine(cache.get(name, make))
+    return _LOADED[name]
+
+
+def compiled(written: Program, what: str) -> Compiled:
+    """The object code of a program.
+
+    Parameters
+    ----------
+    written : Program
+    what : str
+        It is of, for who waits.
+    """
+    with Busy(f"compiling {what} (once for its parts, then kept)"):
         return Compiled(native.compile_text(written.text), written.layout, dict(written.operations))
 
 

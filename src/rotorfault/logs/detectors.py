@@ -9,28 +9,27 @@ and knows no baseline and no alternatives.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic_core import PydanticCustomError
 
 from rotorfault.autopilot.diagnosis.protocol import DIAGNOSIS
-from rotorfault.autopilot.instant import Instant, Past
-from rotorfault.autopilot.rotor_model import expected_thrust, follow, rotors_at_hover
 from rotorfault.base.errors import InputError
+from rotorfault.base.plain_text import one_line
 from rotorfault.base.progress import Bar
+from rotorfault.logs.dynamics import G
+from rotorfault.logs.estimates import in_body
 from rotorfault.logs.log import Log
+from rotorfault.logs.replay import told
 from rotorfault.logs.segments import Hover
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.rotation import Quat
-from rotorfault.model.block import Context
-from rotorfault.model.signals import Command, Estimate, Readings, Reference, motion_of
-from rotorfault.model.vehicle import rotor_speeds
 from rotorfault.model.vehicle_file import VehicleFile, load_vehicle
+from rotorfault.scenario.part import read
 
-FINEST, MOST_STEPS = 0.004, 40_000  # s of a step, and steps of a log
+FINEST, CHUNK = 0.004, 20_000  # s of a step, and steps between two looks at progress
 EARLY, SOON = 0.5, 0.5  # s before an onset that a flag may be of it, and after a flag in which a loss is believed
 NEAR = 0.35  # of the longest arm: how far a motor of the log may be from a rotor of the vehicle
 
@@ -85,96 +84,123 @@ def order_of(log: Log, vehicle: VehicleFile) -> list[int]:
     return order
 
 
-def said_by_all(log: Log, span: tuple[float, float], hover: Hover, vehicle: str | Path) -> list[Said]:
-    """What each registered source says of a flight that has rates, attitude and velocity.
+def said_by_all(
+    log: Log, spans: Sequence[tuple[float, float]], hover: Hover, vehicle: str | Path, own: Sequence[str] = ()
+) -> list[Said]:
+    """What each registered source, and each of one's own, says of flights that have rates, attitude and velocity.
 
     Parameters
     ----------
     log : Log
-    span : (float, float), s
-        Begin and end of the flight.
+    spans : sequence of (float, float), s
+        Begin and end of each flight.
     hover : Hover
     vehicle : str or Path
         Name or file.
+    own : sequence of str
+        Places of code, ``FILE.py:CLASS``, besides the registered ones.
 
     Raises
     ------
     InputError
-        If the vehicle is not the log's.
+        If the vehicle is not the log's, or there is no such code.
     """
     file = load_vehicle(vehicle)
     order = order_of(log, file)
-    missing = [name for name in ("rates", "attitude", "velocity") if name not in log.series]
-    said = []
+    parts: list[tuple[str, Any]] = []
     for name in DIAGNOSIS.registry:
-        kind = DIAGNOSIS.registry[name]
-        if name == DIAGNOSIS.calm or not getattr(kind, "looks", True):
-            continue
-        if missing:
-            said.append(Said(name, (), f"the log has no {', '.join(missing)}"))
-            continue
+        kind: Any = DIAGNOSIS.registry[name]
+        if name != DIAGNOSIS.calm and getattr(kind, "looks", True):
+            parts.append((name, kind(kind.Settings())))
+    parts += [(place, detector_of(place)) for place in own]
+    missing = [name for name in ("rates", "attitude", "velocity") if name not in log.series]
+    if missing:
+        return [Said(name, (), f"the log has no {', '.join(missing)}") for name, _ in parts]
+    said = []
+    for name, part in parts:
         try:
-            said.append(_run(name, log, span, hover, file, order))
+            said.append(_run(name, part, log, spans, hover, file, order))
         except (InputError, ValueError, ZeroDivisionError, OverflowError) as error:
-            said.append(Said(name, (), str(error)))
+            said.append(Said(name, (), one_line(str(error)) or type(error).__name__))
     return said
 
 
-def _run(name: str, log: Log, span: tuple[float, float], hover: Hover, file: VehicleFile, order: list[int]) -> Said:
-    kind: Any = DIAGNOSIS.registry[name]
-    part: Any = kind(kind.Settings())
-    vehicle, step = file.vehicle, max(FINEST, 1.0 / max(log.series["rates"].rate, 1.0))
-    begin, end = span
-    count = min(int((end - begin) / step), MOST_STEPS)
-    time = np.asarray(begin + step * np.arange(count), dtype=float)
+def detector_of(place: str) -> Any:
+    """A source of diagnosis by its name, or by its place in code that the user names.
+
+    Parameters
+    ----------
+    place : str
+        ``FILE.py:CLASS``, ``package.module:CLASS``, or a registered name.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it needs settings.
+    """
+    try:
+        return read(DIAGNOSIS, place, allow=[place]).make()
+    except PydanticCustomError as error:
+        raise InputError(f"detector: {error.message()}") from None
+
+
+def _run(
+    name: str,
+    part: Any,
+    log: Log,
+    spans: Sequence[tuple[float, float]],
+    hover: Hover,
+    file: VehicleFile,
+    order: list[int],
+) -> Said:
+    step = max(FINEST, 1.0 / max(log.series["rates"].rate, 1.0))
     command = log.series["command"]
-    at = np.clip(np.searchsorted(command.time, time, side="right") - 1, 0, None)
-    inside = (command.time >= begin) & (command.time <= end)
+    inside = np.zeros(len(command.time), dtype=bool)
+    for begin, end in spans:
+        inside |= (command.time >= begin) & (command.time <= end)
     even = hover.command.mean(axis=0) if len(hover.time) else np.median(command.values[inside], axis=0)
-    weight = float(vehicle.mass * vehicle.gravity)
-    newton = (command.values[at] / np.maximum(even, 1e-3) * weight / len(order))[:, order]
-    memory: Any = None
-    numbers = part.parameters(Context(vehicle, step))
-    rotors = rotors_at_hover(vehicle)
-    still = Command(PerRotor.of([0.0] * len(order)), zeros())
-    past = Past(rotors, (), still, 0.0,
-                rotor_speeds(vehicle, expected_thrust(rotors, vehicle)))  # fmt: skip
-    first: dict[int, float] = {}
-    losses = [0.0] * len(order)
-    with Bar(f"{name} over {log.source}", count, "steps") as bar:
-        for k, estimate in enumerate(_estimates(log, time)):
-            instant = Instant(Readings(), _nowhere(estimate), vehicle, past, step)
-            instant.outputs["estimator"] = estimate
-            assert DIAGNOSIS.inputs is not None
-            inputs = DIAGNOSIS.inputs(instant)
-            if memory is None:
-                memory = part.initial(inputs, numbers)
-                past = past._replace(previous=motion_of(estimate, vehicle.tilt != ()))
-            memory, diagnosis, _ = part.step(memory, inputs, numbers, step)
-            for rotor, (flagged, loss) in enumerate(zip(diagnosis.flagged, diagnosis.loss, strict=True)):
-                if flagged > 0.5 and rotor not in first:
-                    first[rotor] = float(time[k])
-                if rotor in first and time[k] <= first[rotor] + SOON:
-                    losses[rotor] = max(losses[rotor], float(loss))
-            sent = PerRotor.of(newton[k].tolist())
-            rotors, before = follow(past.rotors, sent, vehicle, step), instant.expectation
-            past = Past(rotors, before.now, Command(sent, zeros()), step, before.speed)
-            if k % 500 == 0:
-                bar.update(k)
-    flags = sorted((order[rotor] + 1, when, losses[rotor]) for rotor, when in first.items())
-    note = "" if count < MOST_STEPS else f"only the first {count * step:.0f} s"
-    return Said(name, tuple(sorted(flags, key=lambda flag: flag[1])), note)
+    weight = float(file.vehicle.mass * file.vehicle.gravity)
+    newton = (weight / len(order) / np.maximum(even, 1e-3))[order]
+    whole = int(sum(max(end - begin, 0.0) for begin, end in spans) / step)
+    flags: list[tuple[int, float, float]] = []
+    done = 0
+    with Bar(f"{name} over {log.source}", whole, "steps") as bar:
+        for begin, end in spans:
+            first: dict[int, float] = {}
+            losses = [0.0] * len(order)
+            now = begin
+            chunks = (_rows(log, time, newton, order) for time in _times(begin, end, step))
+            for values in told(part, file.vehicle, step, chunks):
+                flagged, loss = values[:, : len(order)] > 0.5, values[:, len(order) :]
+                time = now + step * np.arange(len(values))
+                for rotor in range(len(order)):
+                    if rotor not in first and flagged[:, rotor].any():
+                        first[rotor] = float(time[int(np.argmax(flagged[:, rotor]))])
+                    if rotor in first:
+                        soon = (time >= first[rotor]) & (time <= first[rotor] + SOON)
+                        losses[rotor] = max(losses[rotor], float(np.nan_to_num(loss[soon, rotor]).max(initial=0.0)))
+                now, done = float(time[-1] + step), done + len(values)
+                bar.update(done)
+            flags += [(order[rotor] + 1, when, losses[rotor]) for rotor, when in first.items()]
+    return Said(name, tuple(sorted(flags, key=lambda flag: flag[1])), "")
 
 
-def _estimates(log: Log, time: Array) -> Iterator[Estimate]:
-    """What the log says of the motion at some times."""
+def _times(begin: float, end: float, step: float) -> Iterator[Array]:
+    """Instants of a flight, so many at a time."""
+    count = int((end - begin) / step)
+    for k in range(0, count, CHUNK):
+        yield np.asarray(begin + step * np.arange(k, min(k + CHUNK, count)), dtype=float)
+
+
+def _rows(log: Log, time: Array, newton: Array, order: list[int]) -> Array:
+    """What the log says of some instants, and newton that are sent from them on, by the rotors of the vehicle."""
     rates, attitude, velocity = (log.series[name].at(time) for name in ("rates", "attitude", "velocity"))
     place = log.series["position"].at(time) if "position" in log.series else np.zeros((len(time), 3))
     attitude = attitude / np.maximum(np.linalg.norm(attitude, axis=1, keepdims=True), 1e-9)
-    for p, v, q, w in zip(place.tolist(), velocity.tolist(), attitude.tolist(), rates.tolist(), strict=True):
-        yield Estimate(Vec3(*p), Vec3(*v), Quat(*q), Vec3(*w))
-
-
-def _nowhere(estimate: Estimate) -> Reference:
-    """A reference that stands for none: sources of diagnosis do not see it."""
-    return Reference(estimate.p_W, estimate.v_W, zeros(), 0.0, 0.0, 0.0)
+    if "specific_force" in log.series:
+        force = log.series["specific_force"].at(time)
+    else:
+        force = in_body(attitude, np.tile([0.0, 0.0, G], (len(time), 1)))
+    command = log.series["command"]
+    at = np.clip(np.searchsorted(command.time, time, side="right") - 1, 0, None)
+    return np.hstack([place, velocity, attitude, rates, force, command.values[at][:, order] * newton])

@@ -87,8 +87,8 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
     limits += _limits_of_hover(steady, baseline)
     said: list[Said] = []
     if vehicle is not None:
-        span = max(spans, key=lambda one: one[1] - one[0])
-        said = said_by_all(log, (span[0] + TAKE_OFF, span[1]), before, vehicle)
+        flown = [(begin + TAKE_OFF, end) for begin, end in spans]
+        said = said_by_all(log, flown, before, vehicle)
         causes = (seconded(causes[0], said), *causes[1:])
     verdict = verdict_of(log, causes, evidence, None if steady is None else steady.trim)
     shaking, why = shaking_of(log, spans)
