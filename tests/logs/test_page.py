@@ -47,8 +47,8 @@ def test_registered_sources_name_the_motors_of_the_log() -> None:
     assert found.json()["detectors"]
     assert "registered sources flag it first" in found.probable.evidence
     assert "luenberger flags rotor 2 from" in str(found)
-    alone = diagnosis_of(log)  # they count as no further evidence: the records are the same
-    assert [one.probability for one in alone.causes] == [one.probability for one in found.causes]
+    doubt = [1.0 - diagnosis_of(log, vehicle=one).probable.probability for one in (None, "x500")]
+    assert doubt[1] < doubt[0]  # they say the same, so that it is the surer
 
 
 def test_a_vehicle_whose_motors_are_elsewhere_is_refused() -> None:

@@ -37,7 +37,7 @@ def several(args: list[str]) -> list[str]:
     """
     out: list[str] = []
     at = 0
-    takes = {"--vehicle", "--out", "--json"}
+    takes = {"--vehicle", "--detector", "--out", "--json"}
     before = [
         word
         for k, word in enumerate(args[: args.index("--baseline")] if "--baseline" in args else args)
@@ -66,6 +66,14 @@ def diagnose(
         str | None,
         typer.Option(
             metavar="NAME|FILE", help="The vehicle: the registered sources of diagnosis are run over the log too."
+        ),
+    ] = None,
+    detector: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE.py:CLASS",
+            help="A source of diagnosis of your own, run over the log besides the registered ones; takes --vehicle, "
+            "and may be given several times.",
         ),
     ] = None,
     baseline: Annotated[
@@ -102,7 +110,7 @@ def diagnose(
     found, refused = [], []
     for number, path in enumerate(logs):
         try:
-            one = diagnosed(path, known, vehicle)
+            one = diagnosed(path, known, vehicle, detector or [])
         except InputError as error:
             if len(logs) == 1:
                 raise

@@ -11,6 +11,7 @@ from rotorfault.base.bounds import require
 from rotorfault.base.errors import InputError
 from rotorfault.base.files import in_folder, write_atomically
 from rotorfault.logs.baseline import Baseline, digest_of, is_baseline, learned, read_baseline
+from rotorfault.logs.detectors import detector_of
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log
 from rotorfault.logs.page import page_name, write_diagnosis
@@ -75,6 +76,7 @@ def diagnose(
     vehicle: str | Path | None = None,
     baseline: Paths | Baseline = (),
     out: str | Path | None = None,
+    detectors: str | Path | Sequence[str | Path] = (),
 ) -> LogDiagnosis | list[LogDiagnosis]:
     """Say which rotor, if any, a flight log shows to have lost thrust, since when, and how surely.
 
@@ -89,6 +91,8 @@ def diagnose(
         Logs of healthy flights of the same vehicle, or a file that ``rotorfault baseline`` wrote.
     out : str or Path, optional
         Folder for pages with time lines, one for each log.
+    detectors : str or sequence of str, optional
+        Sources of diagnosis of your own, ``FILE.py:CLASS``, run besides the registered ones; takes `vehicle`.
 
     Returns
     -------
@@ -112,13 +116,16 @@ def diagnose(
     if vehicle is not None:
         require(vehicle, (str, Path), "vehicle", "the name of a vehicle, or a file")
     known = baseline if isinstance(baseline, Baseline) else baseline_of(paths_of(baseline, "baseline"))
-    found = [diagnosed(path, known, vehicle) for path in paths]
+    own = [str(path) for path in paths_of(detectors, "detectors")]
+    found = [diagnosed(path, known, vehicle, own) for path in paths]
     if out is not None:
         write_pages(found, Path(out), vehicle)
     return found[0] if isinstance(logs, (str, Path)) else found
 
 
-def diagnosed(path: Path, baseline: Baseline | None, vehicle: str | Path | None = None) -> LogDiagnosis:
+def diagnosed(
+    path: Path, baseline: Baseline | None, vehicle: str | Path | None = None, detectors: Sequence[str] = ()
+) -> LogDiagnosis:
     """The diagnosis of one log.
 
     Parameters
@@ -127,15 +134,21 @@ def diagnosed(path: Path, baseline: Baseline | None, vehicle: str | Path | None 
     baseline : Baseline or None
     vehicle : str, Path or None
         Name or file of the vehicle.
+    detectors : sequence of str
+        Sources of diagnosis of one's own.
 
     Raises
     ------
     InputError
-        If it cannot be read, or the baseline is of another vehicle.
+        If it cannot be read, the baseline is of another vehicle, or there is no such source, or no vehicle for it.
     """
+    if detectors and vehicle is None:
+        raise InputError("a detector needs to know what flew: say it with --vehicle (vehicle= from Python)")
+    for place in detectors:
+        detector_of(place)  # before anything is read
     log = read_log(path)
     others = without(path, baseline_for(log, baseline))
-    found = diagnosis_of(log, others, vehicle)
+    found = diagnosis_of(log, others, vehicle, detectors)
     if baseline is not None and others is not baseline:
         said = "is itself in the baseline and is compared with the others there"
         said = said if others is not None else "is itself the baseline, and nothing else is in it: give other flights"

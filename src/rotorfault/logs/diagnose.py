@@ -16,7 +16,9 @@ import numpy as np
 from rotorfault.logs.baseline import Baseline, hover_command
 from rotorfault.logs.detectors import Said, said_by_all
 from rotorfault.logs.dynamics import Residual, Response, block_length, residual_of
+from rotorfault.logs.forced import short_of
 from rotorfault.logs.log import Log, Note, when
+from rotorfault.logs.resting import resting_residual
 from rotorfault.logs.scan import FIRST, Scan, scan
 from rotorfault.logs.segments import Hover, flight_spans, hover_of
 from rotorfault.logs.sentences import (
@@ -31,6 +33,7 @@ from rotorfault.logs.steady import Steady, steady_of
 from rotorfault.logs.trim import PRIOR
 from rotorfault.logs.verdict import Cause, LogDiagnosis
 from rotorfault.logs.vibration import shaking_of
+from rotorfault.logs.witness import heard
 
 # How often a flight that is looked at has a rotor that suddenly loses thrust, and a lasting push that begins in it.
 # Of what is met at all, half is taken to begin in flight, since nothing is known of it.
@@ -53,7 +56,9 @@ class Sudden(NamedTuple):
     push: float
 
 
-def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path | None = None) -> LogDiagnosis:
+def diagnosis_of(
+    log: Log, baseline: Baseline | None = None, vehicle: str | Path | None = None, detectors: Sequence[str] = ()
+) -> LogDiagnosis:
     """What a log says of its rotors.
 
     Parameters
@@ -63,6 +68,8 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
         Of healthy flights of the same vehicle.
     vehicle : str or Path, optional
         Name or file, for the registered sources of diagnosis.
+    detectors : sequence of str
+        Sources of one's own, ``FILE.py:CLASS``, that are run besides where there is a vehicle.
     """
     limits = list(_limits_of_rates(log))
     spans = flight_spans(log)
@@ -78,6 +85,9 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
         keep = hover.time + 1.0 < first.scan.onset
         before = Hover(*(part[keep] for part in hover))
         limits += _limits_of_onset(log, first.scan.onset)
+    flown = [(begin + TAKE_OFF, end) for begin, end in spans]
+    said = [] if vehicle is None else said_by_all(log, flown, before, vehicle, detectors)
+    first, counts = _with_witness(first, said, flown)
     steady = steady_of(log, before, spans, baseline)
     evidence = None if steady is None else steady.evidence
     causes = _ranked(log, first, steady, baseline)
@@ -85,11 +95,7 @@ def diagnosis_of(log: Log, baseline: Baseline | None = None, vehicle: str | Path
     if stopped is not None and not (causes[0].rotor == stopped.motor and causes[0].onset is not None):
         causes = _with_stopped(log, causes, stopped)
     limits += _limits_of_hover(steady, baseline)
-    said: list[Said] = []
-    if vehicle is not None:
-        flown = [(begin + TAKE_OFF, end) for begin, end in spans]
-        said = said_by_all(log, flown, before, vehicle)
-        causes = (seconded(causes[0], said), *causes[1:])
+    causes = (seconded(causes[0], said, counts), *causes[1:])
     verdict = verdict_of(log, causes, evidence, None if steady is None else steady.trim)
     shaking, why = shaking_of(log, spans)
     limits += [why] if why else []
@@ -107,6 +113,8 @@ def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known:
     found: list[Sudden] = []
     for begin, end in spans:
         residual = residual_of(log, begin + TAKE_OFF, end, mean, known)
+        if residual is None and block_length(log) is None:
+            residual = resting_residual(log, begin, end, mean)
         if residual is None:
             continue
         one = scan(residual)
@@ -123,6 +131,23 @@ def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known:
         weights /= weights.sum()
         found.append(Sudden(one, residual, float(weights[0]), tuple(weights[1:-1].tolist()), float(weights[-1])))
     return found
+
+
+def _with_witness(
+    first: Sudden | None, said: Sequence[Said], flown: Sequence[tuple[float, float]]
+) -> tuple[Sudden | None, float | None]:
+    """What came in flight, with what other sources say of it; and how often as likely that makes its rotor."""
+    if first is None or first.scan.onset is None or first.scan.rotor is None:
+        return first, None
+    onset = first.scan.onset
+    begin = next((begin for begin, end in flown if begin <= onset <= end + 1.0), flown[0][0])
+    told = heard(said, begin, onset, len(first.rotors))
+    if told is None:
+        return first, None
+    weights = np.array([first.none, *(first.rotors * told.rotors), first.push])
+    weights /= weights.sum()
+    joined = first._replace(none=float(weights[0]), rotors=tuple(weights[1:-1].tolist()), push=float(weights[-1]))
+    return joined, float(told.rotors[int(np.argmax(joined.rotors))])
 
 
 def _inside(time: float, spans: Sequence[tuple[float, float]]) -> bool:
@@ -148,8 +173,10 @@ def _ranked(log: Log, sudden: Sudden | None, steady: Steady | None, baseline: Ba
         onset = sudden.scan.onset
         for k, probability in enumerate(sudden.rotors):
             said = sudden_evidence(log, sudden.scan, k)
-            loss = sudden.scan.loss if k == sudden.scan.rotor else None
-            found.append(Cause("rotor loss", k + 1, loss, onset, probability, said))
+            loss, ends = (sudden.scan.loss, sudden.scan.interval) if k == sudden.scan.rotor else (None, None)
+            if loss is not None and (sent := short_of(log, onset, k)) is not None:
+                loss, ends = sent
+            found.append(Cause("rotor loss", k + 1, loss, onset, probability, said, ends))
         for name, share in PUSHES.items():
             said = f"a lasting push from outside since {when(log, onset)}"
             found.append(Cause(name, None, None, onset, sudden.push * share, said))
@@ -258,7 +285,8 @@ def _limits_of_onset(log: Log, onset: float) -> list[str]:
     """Whether records are missing where something begins."""
     gaps: list[tuple[float, float]] = []
     for name in ("rates", "command"):
-        series = log.series[name]
+        if (series := log.series.get(name)) is None:
+            continue
         ends = np.searchsorted(series.time, [onset - NEAR, onset + 2.0 / max(series.rate, 1.0)])
         near = series.time[max(int(ends[0]) - 1, 0) : int(ends[1]) + 1]
         steps = np.diff(near)

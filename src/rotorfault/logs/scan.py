@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotorfault.logs.dynamics import Residual
+from rotorfault.logs.dynamics import UNEVEN, Residual
 from rotorfault.logs.weighing import ratio, weighed
 from rotorfault.maths.arrays import Array
 
@@ -34,6 +34,7 @@ LASTING, PASSING = 0.05, 8  # loss below which what was found has passed, and ho
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)  # s of sums by which the noise is measured
 HOLD = 5.0  # s over which evidence is gathered
+SURE = 1.645  # standard deviations: an interval holds a loss 9 times of 10
 
 
 class Scan(NamedTuple):
@@ -52,6 +53,7 @@ class Scan(NamedTuple):
     scores: Array  # (N,) of each rotor where the evidence is strongest, averaged over losses and gains
     free: float  # the same of a push in any direction
     settled: float | None  # loss by what commands settle at, where the flight goes on calmly
+    interval: tuple[float, float] = (0.0, 1.0)  # that holds the loss 9 times of 10
 
 
 def threshold_of(block: float) -> float:
@@ -170,7 +172,9 @@ def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tupl
     begin = int(onsets[loss, rotor])
     causes = weighed(residual, rho, (begin, k + 1), memory, spread)
     rotor = np.argmax(causes.rotors)
-    settled = _settled_loss(residual, rho, begin, int(rotor))
+    known = _settled_loss(residual, rho, begin, int(rotor), noise)
+    settled = None if known is None else known[0]
+    low, high = causes.intervals[rotor] if known is None else known[1]
     found = said._replace(
         onset=float(residual.time[begin]),
         rotor=int(rotor),
@@ -179,12 +183,18 @@ def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tupl
         scores=causes.rotors,
         free=causes.free,
         settled=settled,
+        interval=(float(low), float(high)),
     )
     return found, begin
 
 
-def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> float | None:
-    """The loss by what the commands settle at, where the flight goes on calmly: there no gain matters."""
+def _settled_loss(
+    residual: Residual, rho: Array, begin: int, rotor: int, noise: tuple[Array, Array]
+) -> tuple[float, tuple[float, float]] | None:
+    """The loss by what the commands settle at, with its interval, where the flight goes on calmly.
+
+    There no gain matters, but how well demand is known before and behind: by the noise of either, and `UNEVEN`.
+    """
     first, last = begin + int(SETTLED / residual.block), begin + int(HOLD / residual.block)
     after = slice(first, min(last, len(rho)))
     command, axes = residual.command[after], residual.patterns[:3]
@@ -192,13 +202,18 @@ def _settled_loss(residual: Residual, rho: Array, begin: int, rotor: int) -> flo
     calm = (command.max(axis=1, initial=0.0) < 0.97) & (np.abs(turn).max(axis=1, initial=0.0) < CALM)
     if calm.sum() < SETTLED / residual.block or calm.mean() < 0.8:
         return None
-    shape = axes[:, rotor]
+    shape, square = axes[:, rotor], float(axes[:, rotor] @ axes[:, rotor])
     known = rho[after][calm][:, :3]
     if not np.isfinite(known).any(axis=0).all():
         return None
-    mean = np.nanmedian(known, axis=0)
-    loss = -float(mean @ shape) / float(shape @ shape) / float(np.median(command[calm, rotor]))
-    return min(max(loss, 0.01), 1.0)
+    asked = float(np.median(command[calm, rotor]))
+    loss = -float(np.nanmean(known, axis=0) @ shape) / square / asked
+    memory, spread = noise[0][:3], noise[1][:3]
+    mean = spread / (1.0 - memory) / math.sqrt(float(calm.sum()))
+    doubt = np.hypot(mean, UNEVEN * residual.response.hover / math.sqrt(len(command.T)))
+    half = SURE * math.sqrt(float((doubt * shape) @ (doubt * shape))) / square / asked
+    ends = min(max(loss - half, 0.01), 1.0), min(max(loss + half, 0.01), 1.0)
+    return min(max(loss, 0.01), 1.0), ends
 
 
 def _longer(new: Array, block: float) -> float:

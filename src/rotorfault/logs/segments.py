@@ -80,15 +80,17 @@ def hover_of(log: Log, spans: list[tuple[float, float]]) -> Hover:
     return Hover(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
 
 
-def hover_blocks(log: Log, begin: float, end: float) -> Hover:
+def hover_blocks(log: Log, begin: float, end: float, length: float = BLOCK) -> Hover:
     """Blocks of hover between two times.
 
     Parameters
     ----------
     log : Log
     begin, end : float, s
+    length : float, s
+        Of a block.
     """
-    edges = np.arange(begin, end + 1e-9, BLOCK)
+    edges = np.arange(begin, end + 1e-9, length)
     count = max(len(edges) - 1, 0)
     good = np.ones(count, dtype=bool)
     command = block_means(log.series["command"], edges)

@@ -10,6 +10,7 @@ import numpy as np
 from rotorfault.logs.baseline import Baseline
 from rotorfault.logs.detectors import Said
 from rotorfault.logs.dynamics import G
+from rotorfault.logs.forced import short_of
 from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
 from rotorfault.logs.trim import Evidence, Trim
@@ -18,6 +19,7 @@ from rotorfault.logs.vibration import Shaking, more_than
 
 # 1/s, drag over mass: mean of its logarithm and standard deviation, of the built-in vehicles (0.12 to 0.45).
 DRAG = (math.log(0.23), 0.45)
+NARROW = 0.2  # width of a loss's interval up to which "about" says it
 LEANS = math.radians(1.0)  # below which a lean may be an error of the attitude
 NAMED = {"healthy": "a sound vehicle", "centre of mass shifted": "a shifted centre of mass"}
 SIDES = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
@@ -70,13 +72,11 @@ def sudden_evidence(log: Log, scan: Scan, rotor: int) -> str:
     said = [f"the body turned as if it pulled less from {when(log, scan.onset)}", odds]
     if scan.alarm is not None:
         said.append(f"certain {max(scan.alarm - scan.onset, 0.0):.2f} s later")
-    output, command = log.series.get("output"), log.series.get("command")
-    if output is not None and command is not None and scan.onset is not None:
-        window = (output.time > scan.onset + 0.2) & (output.time < scan.onset + 1.0)
-        if window.sum() >= 3:
-            short = (command.at(output.time[window]) - output.values[window]).mean(axis=0)
-            if short[rotor] > 0.15 and short[rotor] == short.max():
-                said.append("what was sent to it is less than what was asked for: its output was forced or limited")
+    if (sent := short_of(log, scan.onset, rotor)) is not None:
+        said.append(
+            f"it was sent {1.0 - sent[0]:.0%} of what was asked for: its output was forced or limited, so that the "
+            "loss is that of the output"
+        )
     return "; ".join(said)
 
 
@@ -115,27 +115,28 @@ def trim_evidence(name: str, rotor: int | None, evidence: Evidence, trim: Trim |
     return said
 
 
-def seconded(cause: Cause, said: Sequence[Said]) -> Cause:
-    """A cause with how many of the registered sources of diagnosis say the same.
+def seconded(cause: Cause, said: Sequence[Said], counts: float | None) -> Cause:
+    """A cause with how many of the registered sources of diagnosis say the same, and what that counts.
 
     Parameters
     ----------
     cause : Cause
         The most probable.
     said : sequence of Said
-
-    Notes
-    -----
-    They count as no further evidence: they look at the same records, and what stands in them is already weighed.
+    counts : float or None
+        How often as likely they make its rotor; None where nothing began that they could speak for.
     """
-    ran = [one for one in said if not one.note or one.flags]
+    ran = [one for one in said if not one.note]
     if not ran:
         return cause
-    if cause.rotor is None:
+    if cause.rotor is None or cause.onset is None:
         quiet = sum(not one.flags for one in ran)
         return cause._replace(evidence=f"{cause.evidence}; {quiet} of {len(ran)} registered sources flag nobody")
     same = sum((flag := one.first(cause.onset)) is not None and flag[0] == cause.rotor for one in ran)
-    return cause._replace(evidence=f"{cause.evidence}; {same} of {len(ran)} registered sources flag it first")
+    said_so = f"{same} of {len(ran)} registered sources flag it first"
+    if counts is not None:
+        said_so += f", which makes it {counts:.2g} times as likely"
+    return cause._replace(evidence=f"{cause.evidence}; {said_so}")
 
 
 def shaking_words(log: Log, now: Shaking, baseline: Baseline | None) -> list[str]:
@@ -200,9 +201,25 @@ def verdict_of(log: Log, causes: Sequence[Cause], evidence: Evidence | None, tri
         )
         return f"{word} {how}{_rest(log, causes, None, None)}"
     may = "" if first.probability >= 0.75 else " may have"
-    lost = "lost thrust" if first.loss is None else f"lost about {100.0 * first.loss:.0f} % of its thrust"
+    lost = f"lost {share_words(first)} of its thrust" if first.loss is not None else "lost thrust"
     since = f"from {when(log, first.onset)}" if first.onset is not None else "from the beginning of the log"
     return f"{rotor_words(log, first.rotor)}{may} {lost} {since} {how}{_rest(log, causes, evidence, trim)}"
+
+
+def share_words(cause: Cause) -> str:
+    """How much of its thrust a rotor lost: with its interval where that is wide.
+
+    Parameters
+    ----------
+    cause : Cause
+    """
+    loss, ends = 100.0 * (cause.loss or 0.0), cause.interval
+    if ends is None or ends[1] - ends[0] <= NARROW:
+        return f"about {loss:.0f} %"
+    low, high = 100.0 * ends[0], 100.0 * ends[1]
+    if high > 97.0:
+        return f"{low:.0f} % or more, likely {loss:.0f} %,"
+    return f"{low:.0f} to {high:.0f} %, likely {loss:.0f} %,"
 
 
 def _rest(log: Log, causes: Sequence[Cause], evidence: Evidence | None, trim: Trim | None) -> str:

@@ -140,7 +140,7 @@ class LogDiagnosis:
             ("its own messages", self.own),
             ("vibration", self.vibration),
             (
-                "registered sources of diagnosis (of the same records, so they do not count again)",
+                "registered sources of diagnosis (of the same records, so that all count as one witness)",
                 tuple(_said(one, self.log, self.probable) for one in self.detectors),
             ),
              ("cannot tell", self.limits), ("read", self._read()),

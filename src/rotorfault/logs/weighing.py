@@ -27,6 +27,7 @@ from rotorfault.maths.arrays import Array
 TAIL = 4.0  # degrees of freedom: residuals of healthy flights have a kurtosis beyond any normal one
 POINTS = np.linspace(-3.0, 3.0, 61)  # of a normal distribution, in standard deviations
 LOSSES = np.linspace(0.02, 1.0, 50)  # each as likely before as any other
+ENDS = (0.05, 0.95)  # of an interval that holds a loss 9 times of 10
 BEGUN = (1.0 / 6.0, 0.5, 5.0 / 6.0)  # share of the first block that lies behind the onset
 PUSH = (SHIFT, SHIFT, 0.25 * WIND, SAG)  # what a push turns and lifts by, as in trim: shares of the command in hover
 
@@ -37,6 +38,7 @@ class Weighed(NamedTuple):
     rotors: Array  # (N,)
     free: float  # of a push
     losses: Array  # (N,) mean loss of each rotor, if it is that
+    intervals: Array  # (N, 2) that hold it 9 times of 10
 
 
 def ratio(noise: Array, signal: Array) -> Array:
@@ -85,9 +87,12 @@ def weighed(residual: Residual, rho: Array, span: tuple[int, int], memory: Array
     each = rotors.reshape(-1, motors)
     even = np.full(len(each), 1.0 / len(each))
     weights = np.exp(each - each.max(axis=0))
-    losses = np.tile(LOSSES, len(BEGUN)) @ weights / weights.sum(axis=0)
+    by_loss = weights.reshape(len(BEGUN), len(LOSSES), motors).sum(axis=0) / weights.sum(axis=0)
+    losses, share = LOSSES @ by_loss, np.cumsum(by_loss, axis=0) - 0.5 * by_loss
+    step = 0.5 * (LOSSES[1] - LOSSES[0]) * np.array([-1.0, 1.0])  # a loss lies between those that are tried
+    intervals = np.array([np.clip(np.interp(ENDS, share[:, k], LOSSES) + step, 0.01, 1.0) for k in range(motors)])
     scores = np.array([_log_mean(each[:, k], even) for k in range(motors)])
-    return Weighed(scores, _log_mean(free, np.full(len(BEGUN), 1.0 / len(BEGUN))), np.asarray(losses))
+    return Weighed(scores, _log_mean(free, np.full(len(BEGUN), 1.0 / len(BEGUN))), np.asarray(losses), intervals)
 
 
 class _Axis(NamedTuple):
