@@ -85,6 +85,28 @@ def test_a_blackbox_says_the_same_however_it_was_decoded(written_as: dict, quad:
     assert log.series["command"].values.mean() == pytest.approx(quad.command.mean(), abs=0.003)
 
 
+@pytest.mark.parametrize("pulses", [True, False], ids=["pulses", "digital"])
+def test_where_the_unit_of_motors_is_not_known_losses_are_told_for_both(pulses: bool, tmp_path: Path) -> None:
+    """A table that begins in the air may have values from 900 to 2000 in either unit."""
+    flight = lost(1, loss=0.3)
+    flight = Flown(*(part[400:] for part in flight[:6]), flight.frame)
+    found = diagnosis_of(read_log(write_betaflight(flight, tmp_path / "a.csv", header=False, pulses=pulses)))
+    assert found.rotor == 3
+    low, high = found.probable.interval or (0.0, 0.0)
+    assert low < 0.31
+    assert high > 0.29
+    assert high - low > 0.05
+    assert any("losses are told for both" in said for said in found.log.remarks)
+
+
+def test_motors_that_tell_their_speeds_are_digital(tmp_path: Path) -> None:
+    flight = lost(1, loss=0.3)
+    flight = Flown(*(part[400:] for part in flight[:6]), flight.frame)
+    log = read_log(write_betaflight(flight, tmp_path / "a.csv", header=False, pulses=False, speeds=True))
+    assert "otherwise" not in log.series
+    assert diagnosis_of(log).probable.loss == pytest.approx(0.3, abs=0.03)
+
+
 def test_a_blackbox_of_six_motors_has_those_of_a_hexa_x(tmp_path: Path) -> None:
     flight = lost(0, frame="hexa-x")
     names(diagnosis_of(read_log(write_betaflight(flight, tmp_path / "a.csv", order=(3, 4, 5, 2, 0, 1)))), 5)
@@ -218,11 +240,16 @@ def test_topics_that_are_not_needed_may_be_missing(gone: str, topics: list[Rows]
     names(written(ulog(made, geometry("quad-x")), tmp_path / "a.ulg"), 2)
 
 
-@pytest.mark.parametrize(("gone", "says"), [("angular", "no body rates"), ("thrust", "no commands of motors")])
-def test_topics_that_are_needed_are_named(gone: str, says: str, topics: list[Rows], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("gone", "says", "rotor"), [("angular", "no body rates", 2), ("thrust", "no commands of motors", None)]
+)
+def test_topics_that_are_needed_are_named(
+    gone: str, says: str, rotor: int | None, topics: list[Rows], tmp_path: Path
+) -> None:
+    """Without rates a loss still shows in hover."""
     made = [one for one in topics if gone not in one.name]
     found = written(ulog(made, geometry("quad-x")), tmp_path / "a.ulg")
-    assert found.rotor is None
+    assert found.rotor == rotor
     assert any(says in limit for limit in found.limits)
 
 

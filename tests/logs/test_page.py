@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made_up_logs import flown, level, log_of
 
@@ -11,7 +12,7 @@ from rotorfault.base.errors import InputError
 from rotorfault.logs.api import write_pages
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import diagnosis_of
-from rotorfault.logs.log import Log, named_layout
+from rotorfault.logs.log import Log, Series, named_layout
 from rotorfault.logs.page import data_of
 from rotorfault.model.vehicle_file import load_vehicle
 
@@ -59,3 +60,19 @@ def test_a_vehicle_whose_motors_are_elsewhere_is_refused() -> None:
     hexa = Log("six", "made up", named_layout("hexa-x", ""), log.series)
     with pytest.raises(InputError, match="has 6 motors"):
         order_of(hexa, load_vehicle("x500"))
+
+
+def test_evidence_ends_where_the_vehicle_is_over() -> None:
+    log = level(log_of(flown(seed=1, rotor=2, loss=0.9, seconds=26.0)))
+    over = np.where(log.series["attitude"].time < 31.0, 0.0, 2.0)  # rad of roll, a second after the onset
+    turned = np.column_stack([np.cos(0.5 * over), np.sin(0.5 * over), 0.0 * over, 0.0 * over])
+    log.series["attitude"] = Series(log.series["attitude"].time, turned)
+    found = diagnosis_of(log)
+    assert found.rotor == 3
+    assert found.json()["over"] == pytest.approx(31.0, abs=0.02)
+    assert any("the flight is over" in said for said in found.limits)
+    data = data_of(found)
+    time, belief = data["time"].values, data["diagnosis.belief"].values
+    assert np.isnan(belief[time > 21.1]).all()
+    assert np.isfinite(belief[time < 21.0]).all()
+    assert np.isfinite(data["diagnosis.evidence_against_rotors"].values[:, 4]).all()  # the threshold goes on

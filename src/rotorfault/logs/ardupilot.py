@@ -22,8 +22,13 @@ from rotorfault.model.importers.ardupilot import BY_NUMBERS
 from rotorfault.model.thrust_curve import share_of
 
 WANTED = dict.fromkeys(
-    ("RCOU", "ATT", "RATE", "IMU", "XKF1", "NKF1", "XKF4", "NKF4", "BAT", "CURR", "ESC", "CTUN", "XKF2", "NKF2")
-)
+    (
+        "RCOU", "RCO2", "RCO3", "ATT", "RATE", "IMU", "GYR", "ACC", "XKF1", "NKF1", "EKF1", "XKF4", "NKF4", "XKF2",
+        "NKF2", "EKF2", "BAT", "CURR", "ESC", "CTUN", *(f"ESC{k}" for k in range(1, 9)),
+    )
+)  # fmt: skip
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}  # s of a record's time; the second up to version 3.2
+OUTPUTS = (("RCOU", 14), ("RCO2", 18), ("RCO3", 32))  # messages of outputs, and the last that each has
 FLIP = np.array([1.0, -1.0, -1.0])
 FUNCTIONS = {**{33 + k: k for k in range(8)}, **{82 + k: 8 + k for k in range(4)}}  # SERVOn_FUNCTION: index of motor
 OTHERS = re.compile(r"\b(ArduPlane|Rover|ArduSub|Blimp|AntennaTracker)\b")  # vehicles whose logs look alike
@@ -77,24 +82,27 @@ def _series(
         return None
     table = message.rows.table()
     names = table.dtype.names or ()
-    if "TimeUS" not in names or any(f not in names or table.dtype[f].kind not in "fiu" for f in fields):
+    clock = next((name for name in CLOCKS if name in names), None)
+    if clock is None or any(f not in names or table.dtype[f].kind not in "fiu" for f in fields):
         return None
     if index in names and table.dtype[index].kind in "iu":
         one = which if which is not None and (table[index] == which).any() else table[index].min()
         table = table[table[index] == one]
     with np.errstate(invalid="ignore"):
         values = np.column_stack([table[f].astype(float) * message.scale.get(f, 1.0) for f in fields]) * scale
-    return Series(table["TimeUS"].astype(float) * 1e-6, values)
+    return Series(table[clock].astype(float) * CLOCKS[clock], values)
 
 
 def _motion(file: DataflashFile) -> dict[str, Series]:
     degrees = np.radians(1.0)
     found = {
         "rates": _series(file, "IMU", ("GyrX", "GyrY", "GyrZ"), FLIP, "I")
+        or _series(file, "GYR", ("GyrX", "GyrY", "GyrZ"), FLIP, "I")
         or _series(file, "RATE", ("R", "P", "Y"), FLIP * degrees),
-        "specific_force": _series(file, "IMU", ("AccX", "AccY", "AccZ"), FLIP, "I"),
+        "specific_force": _series(file, "IMU", ("AccX", "AccY", "AccZ"), FLIP, "I")
+        or _series(file, "ACC", ("AccX", "AccY", "AccZ"), FLIP, "I"),
     }
-    for filter_ in ("XKF", "NKF"):
+    for filter_ in ("XKF", "NKF", "EKF"):
         core = _primary(file, f"{filter_}4")
         velocity = _series(file, f"{filter_}1", ("VN", "VE", "VD"), FLIP, "C", core)
         position = _series(file, f"{filter_}1", ("PN", "PE", "PD"), FLIP, "C", core)
@@ -173,11 +181,26 @@ def _channels(file: DataflashFile, count: int) -> dict[int, int]:
     return channels or {k: k + 1 for k in range(count)}
 
 
+def _pulses(file: DataflashFile, channels: Sequence[int]) -> Series | None:
+    """Some outputs, from 1, at the times of the first: not all are in one message where there are more than 14."""
+    each = []
+    for channel in channels:
+        name = next((name for name, last in OUTPUTS if channel <= last), "")
+        one = _series(file, name, [f"C{channel}"])
+        if one is None:
+            return None
+        each.append(one)
+    time = each[0].time
+    if all(len(one.time) == len(time) for one in each):
+        return Series(time, np.column_stack([one.values[:, 0] for one in each]))
+    return Series(time, np.column_stack([one.at(time)[:, 0] for one in each]))
+
+
 def _output(file: DataflashFile, count: int) -> Series | None:
     parameters, channels = file.parameters, _channels(file, count)
     if any(k not in channels for k in range(count)):
         return None
-    pulses = _series(file, "RCOU", [f"C{channels[k]}" for k in range(count)])
+    pulses = _pulses(file, [channels[k] for k in range(count)])
     if pulses is None:
         return None
     low, high = parameters.get("MOT_PWM_MIN", 1000.0) or 1000.0, parameters.get("MOT_PWM_MAX", 2000.0) or 2000.0
@@ -194,23 +217,22 @@ def _power(file: DataflashFile, layout: Layout | None) -> dict[str, Series]:
     battery = _series(file, "BAT", ("Volt", "Curr"), index="Instance") or _series(file, "CURR", ("Volt", "Curr"))
     if battery is not None:
         found["battery"] = battery
-    message = file.messages.get("ESC")
-    if message is None or layout is None:
-        return found
-    table = message.rows.table()
-    names = table.dtype.names or ()
-    if not {"TimeUS", "Instance", "RPM", "Curr"} <= set(names):
+    if layout is None:
         return found
     count = len(layout.places)
     numbers = [_channels(file, count).get(k, 0) - 1 for k in range(count)]  # an ESC has the number of its output
-    if not set(numbers) <= set(table["Instance"].tolist()):
+    message = file.messages.get("ESC")
+    table = None if message is None else message.rows.table()
+    there = set() if table is None or "Instance" not in (table.dtype.names or ()) else set(table["Instance"].tolist())
+    if there and not set(numbers) <= there:
         numbers = list(range(count))
     for field, name in (("RPM", "rpm"), ("Curr", "current")):
-        each = [table[table["Instance"] == k] for k in numbers]
-        if all(len(rows) > 1 for rows in each):
-            time = each[0]["TimeUS"].astype(float) * 1e-6
-            columns = [
-                np.interp(time, rows["TimeUS"].astype(float) * 1e-6, rows[field].astype(float)) for rows in each
-            ]
-            found[name] = Series(time, np.column_stack(columns))
+        if there:
+            each = [_series(file, "ESC", (field,), index="Instance", which=k) for k in numbers]
+        else:  # up to version 4.0, each a message of its own
+            each = [_series(file, f"ESC{k + 1}", (field,)) for k in numbers]
+        known = [one for one in each if one is not None and len(one.time) > 1]
+        if len(known) == count:
+            time = known[0].time
+            found[name] = Series(time, np.column_stack([one.at(time)[:, 0] for one in known]))
     return found

@@ -86,10 +86,10 @@ def read_betaflight_log(path: Path, table: Table) -> Log:
     while f"motor[{count}]" in columns:
         count += 1
     motors = np.column_stack([columns[f"motor[{k}]"] for k in range(count)])
-    low, high = _range(motors, facts, remarks)
-    signal = np.clip((motors - low) / (high - low), 0.0, 1.0)
-    series: dict[str, Series] = {}
     speeds = columns_of(columns, *(f"eRPM[{k}]" for k in range(count)))
+    ends, sure = _range(motors, facts, remarks, speeds is not None)
+    signal = _signal(motors, ends)
+    series: dict[str, Series] = {}
     if speeds is not None:
         poles = number_of(facts.get("motor_poles", ""))
         known = poles >= 2.0
@@ -99,7 +99,10 @@ def read_betaflight_log(path: Path, table: Table) -> Log:
             remarks.append(
                 f"rotor speeds are those of motors with {POLES:.0f} poles: the table does not say how many"
             )
-    series["command"] = Series(time, share_of(signal, _curve(signal, speeds, remarks)))
+    curve = _curve(signal, speeds, remarks)
+    series["command"] = Series(time, share_of(signal, curve))
+    if not sure:
+        series["otherwise"] = Series(time, share_of(_signal(motors, (_idle(DIGITAL), DIGITAL[1])), curve))
     for field in ("gyroADC", "gyroUnfilt"):
         gyro = columns_of(columns, *(f"{field}[{k}]" for k in range(3)))
         if gyro is not None:
@@ -136,26 +139,40 @@ def _usual(count: int) -> Layout | None:
     return None
 
 
-def _range(motors: Array, facts: Mapping[str, str], remarks: list[str]) -> tuple[float, float]:
-    """Ends of the motors' signal: where they idle, and the greatest."""
+def _signal(motors: Array, ends: tuple[float, float]) -> Array:
+    """Values of motors as shares of their range."""
+    share: Array = np.clip((motors - ends[0]) / (ends[1] - ends[0]), 0.0, 1.0)
+    return share
+
+
+def _idle(ends: tuple[float, float]) -> float:
+    """Where digital motors idle by default."""
+    return ends[0] + IDLE * (ends[1] - ends[0])
+
+
+def _range(
+    motors: Array, facts: Mapping[str, str], remarks: list[str], telemetry: bool
+) -> tuple[tuple[float, float], bool]:
+    """Ends of the motors' signal: where they idle, and the greatest; and whether that is sure.
+
+    Only digital motors tell their speeds (`telemetry`).
+    """
     said = [number_of(part) for part in facts.get("motoroutput", "").split(",")]
     if len(said) == 2 and said[1] > said[0] >= 0.0:
-        return said[0], said[1]
+        return (said[0], said[1]), True
     running = motors[motors > 0.0]
     least, most = (float(running.min()), float(running.max())) if len(running) else (0.0, 0.0)
-    if least < BELOW or most > PULSES[1] + 1.0:
-        low, high = DIGITAL
-        idle = low + IDLE * (high - low)
-        remarks.append("motors are digital and idle at 5.5 %: the table does not say its motorOutput")
-        return min(idle, max(least, low)), high
     low, high = number_of(facts.get("minthrottle", "")), number_of(facts.get("maxthrottle", ""))
+    if telemetry or least < BELOW or most > PULSES[1] + 1.0:
+        remarks.append("motors are digital and idle at 5.5 %: the table does not say its motorOutput")
+        return (min(_idle(DIGITAL), max(least, DIGITAL[0])), DIGITAL[1]), True
     if high > low >= BELOW:
-        return low, high
+        return (low, high), True
     remarks.append(
-        "motors are taken to have pulses of 1000 to 2000 us, for the table does not say its motorOutput; if they are "
-        "digital, a loss is smaller than is said"
+        "motors are taken to have pulses of 1000 to 2000 us, for the table does not say its motorOutput; they may as "
+        "well be digital, so that losses are told for both: export the log with its header"
     )
-    return PULSES
+    return PULSES, False
 
 
 def _curve(signal: Array, speeds: Array | None, remarks: list[str]) -> float:

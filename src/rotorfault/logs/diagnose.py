@@ -15,7 +15,7 @@ import numpy as np
 
 from rotorfault.logs.baseline import Baseline, hover_command
 from rotorfault.logs.detectors import Said, said_by_all
-from rotorfault.logs.dynamics import Residual, Response, block_length, residual_of
+from rotorfault.logs.dynamics import Residual, Response, block_length, fallen, residual_of
 from rotorfault.logs.forced import short_of
 from rotorfault.logs.log import Log, Note, when
 from rotorfault.logs.resting import resting_residual
@@ -43,6 +43,7 @@ TAKE_OFF = 1.5  # s in which the ground is near
 IN_FLIGHT = 0.5  # s: a log that begins so shortly before its flight begins in the air
 BLIND, NEAR = 0.3, 0.5  # s without records, and how shortly before an onset, in which it may have begun
 SENT = 0.99  # that a motor gave no thrust, if the log says twice that it was sent none
+SLOWLY = "what begins in a flight is looked for in steady hover alone, and told to about a second"
 PUSHES = {"wind": 0.6, "centre of mass shifted": 0.3, "drag": 0.1}  # what a push from outside is
 
 
@@ -57,7 +58,10 @@ class Sudden(NamedTuple):
 
 
 def diagnosis_of(
-    log: Log, baseline: Baseline | None = None, vehicle: str | Path | None = None, detectors: Sequence[str] = ()
+    log: Log,
+    baseline: Baseline | None = None,
+    vehicle: str | Path | None = None,
+    detectors: Sequence[str] = (),
 ) -> LogDiagnosis:
     """What a log says of its rotors.
 
@@ -85,6 +89,9 @@ def diagnosis_of(
         keep = hover.time + 1.0 < first.scan.onset
         before = Hover(*(part[keep] for part in hover))
         limits += _limits_of_onset(log, first.scan.onset)
+        if first.scan.over is not None:
+            time, why = first.scan.over
+            limits.append(f"at {when(log, time)}, {why}: the flight is over, and what follows is not weighed")
     flown = [(begin + TAKE_OFF, end) for begin, end in spans]
     said = [] if vehicle is None else said_by_all(log, flown, before, vehicle, detectors)
     first, counts = _with_witness(first, said, flown)
@@ -94,6 +101,8 @@ def diagnosis_of(
     stopped = next((note for note in log.notes if note.stopped and _inside(note.time, spans)), None)
     if stopped is not None and not (causes[0].rotor == stopped.motor and causes[0].onset is not None):
         causes = _with_stopped(log, causes, stopped)
+    if "otherwise" in log.series and baseline is None:
+        causes = _either(causes, diagnosis_of(_otherwise(log)).causes)
     limits += _limits_of_hover(steady, baseline)
     causes = (seconded(causes[0], said, counts), *causes[1:])
     verdict = verdict_of(log, causes, evidence, None if steady is None else steady.trim)
@@ -118,6 +127,8 @@ def _sudden(log: Log, spans: Sequence[tuple[float, float]], hover: Hover, known:
         if residual is None:
             continue
         one = scan(residual)
+        if one.onset is not None:
+            one = one._replace(over=fallen(log, one.onset, end + 1.0, mean))
         blocks, motors = max(int(np.isfinite(one.residual[:, 0]).sum()), 1), len(one.scores)
         if one.onset is None:
             found.append(Sudden(one, residual, 1.0, (0.0,) * motors, 0.0))
@@ -221,6 +232,24 @@ def _merged(causes: list[Cause]) -> list[Cause]:
     return list(kept.values())
 
 
+def _otherwise(log: Log) -> Log:
+    """The same log with its commands in the other unit that they may have."""
+    series = {**log.series, "command": log.series["otherwise"]}
+    del series["otherwise"]
+    return Log(log.source, log.kind, log.layout, series, log.parameters, log.notes)
+
+
+def _either(causes: Sequence[Cause], others: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Causes with the losses of two readings of a log; which rotor it is does not hang on the unit of commands."""
+    by_other = {(one.cause, one.rotor): one for one in others}
+    found = []
+    for one in causes:
+        known = [each for each in (one, by_other.get((one.cause, one.rotor))) if each is not None]
+        ends = [end for each in known if each.loss is not None for end in (each.interval or (each.loss, each.loss))]
+        found.append(one._replace(interval=(min(ends), max(ends))) if ends else one)
+    return tuple(found)
+
+
 CONTROL = ("MC_", "MPC_THR", "ATC_", "PSC_", "MOT_", "CA_", "THR_MDL", "PWM_", "SERVO")
 
 
@@ -260,13 +289,13 @@ def _limits_of_rates(log: Log) -> list[str]:
             f"the places of motors are assumed ({log.layout.source}): compare the numbers with your vehicle"
         )
     if rates is None:
-        limits.append("no body rates: a sudden loss is not looked for; log the gyro at 50 Hz or more")
+        limits.append(f"no body rates: {SLOWLY}; log the gyro at 50 Hz or more")
         return limits
     length = block_length(log)
     slow = "commands" if command.rate < 0.5 * rates.rate else "rates"
     if length is None:
-        limits.append(f"{slow} are logged too slowly ({min(command.rate, rates.rate):.1f} Hz) to see a sudden loss; "
-                      "log both at 20 Hz or more")  # fmt: skip
+        limits.append(f"{slow} are logged too slowly ({min(command.rate, rates.rate):.1f} Hz) to see how the body "
+                      f"turns: {SLOWLY}; log both at 20 Hz or more")  # fmt: skip
     elif length > 0.06:
         limits.append(f"{slow} are logged at {min(command.rate, rates.rate):.0f} Hz: an onset is told to about "
                       f"{length:.1f} s; log both at 50 Hz for 0.05 s")  # fmt: skip

@@ -46,6 +46,7 @@ CORRELATED = 0.5  # least correlation of demand and turn with which a gain is be
 LONGEST = 20_000  # blocks that are looked at for gains
 STALE = 3.0  # periods of commands, beyond which the last one is not known to hold
 UPSET = 1.2  # rad of tilt, beyond which the model of hover ends
+HIT = 2.0  # times what all rotors give at their greatest command: no manoeuvre feels like that
 LEAST_GAIN_ERROR = 0.1  # of a gain, however well it is known: thrust changes with airspeed and battery
 
 
@@ -157,6 +158,43 @@ def _upset(log: Log, edges: Array) -> NDArray[np.bool_]:
     over = upright < math.cos(UPSET)
     width = int(1.0 / (edges[1] - edges[0])) + 1
     return np.asarray(np.convolve(over, np.ones(width))[: len(over)] > 0.0)
+
+
+def fallen(log: Log, onset: float, end: float, hover: float) -> tuple[float, str] | None:
+    """When a vehicle flies no more after an onset, in s, and why; None where it goes on.
+
+    It is tilted too far (where no attitude is logged: it has turned so far about roll and pitch since the onset), or
+    hits something: it feels more than rotors can give.
+
+    Parameters
+    ----------
+    log : Log
+    onset, end : float, s
+        Between which it is looked for.
+    hover : float
+        Mean command in hover.
+    """
+    attitude, rates, force = (log.series.get(name) for name in ("attitude", "rates", "specific_force"))
+    found: list[tuple[float, str]] = []
+    tilt: Array | None = None
+    if attitude is not None:
+        w, x, y, z = attitude.values.T
+        level = (w * w - x * x - y * y + z * z) / np.maximum((attitude.values**2).sum(axis=1), 1e-12)
+        time, tilt = attitude.time, np.arccos(np.clip(level, -1.0, 1.0))
+    elif rates is not None:
+        time = rates.time
+        inside = (time >= onset) & (time <= end)
+        steps = np.diff(time, prepend=time[0])[:, None] * rates.values[:, :2] * inside[:, None]
+        tilt = np.linalg.norm(np.cumsum(steps, axis=0), axis=1)
+    if tilt is not None and (over := (time >= onset) & (time <= end) & (tilt > UPSET)).any():
+        found.append((float(time[int(np.argmax(over))]), f"it is tilted by more than {math.degrees(UPSET):.0f} deg"))
+    if force is not None:
+        size, most = np.linalg.norm(force.values, axis=1), HIT * G / max(hover, 0.02)
+        hit = (force.time >= onset) & (force.time <= end) & (size > most)
+        if hit.any():
+            k = int(np.argmax(hit))
+            found.append((float(force.time[k]), f"it hits something, with {size[k] / G:.0f} g"))
+    return min(found, default=None)
 
 
 def _blocks(log: Log, edges: Array) -> _Blocks:

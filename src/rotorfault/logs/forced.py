@@ -9,7 +9,10 @@ import numpy as np
 
 from rotorfault.logs.log import Log
 
-SETTLING, UNTIL = 0.2, 1.0  # s after an onset between which output and command are compared: before, the log is between
+SETTLING, UNTIL = (
+    0.2,
+    1.0,
+)  # s after an onset between which output and command are compared: before, the log is between
 SHORT = 0.15  # of the greatest thrust: beyond it what is sent is another thing than what is asked for
 FEWEST = 3  # records
 

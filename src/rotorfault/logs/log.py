@@ -17,6 +17,7 @@ from rotorfault.maths.arrays import Array
 from rotorfault.model.frames import FRAMES, place_of
 
 DAY = 86400.0  # s: no log pauses for longer
+WRAP, NEAR_WRAP = 2.0**32 * 1e-6, 5.0  # s after which a counter of us begins again, and how near a step back is to it
 
 
 class Series(NamedTuple):
@@ -107,7 +108,8 @@ class Log:
         ``command`` (share of greatest thrust per motor), ``rates`` (rad/s), ``attitude`` (quaternion body to world,
         scalar first), ``velocity`` (m/s), ``position`` (m), ``specific_force`` (m/s^2), ``battery`` (V, A), ``rpm``,
         ``current`` (A per motor), ``landed`` (1 on the ground); what the log lacks is left out. Also ``output``: what
-        was sent to the motors, where `command` was rebuilt from set-points.
+        was sent to the motors, where `command` was rebuilt from set-points; and ``otherwise``: what `command` is as
+        well, where the log does not say its unit.
     parameters : mapping of str to float
         Of the flight software.
     notes : tuple of Note
@@ -190,6 +192,9 @@ def cleaned(series: Series) -> tuple[Series, int]:
     time, values = time[good], values[good]
     twice = np.concatenate([np.diff(time) == 0.0, [False]]) if len(time) else np.zeros(0, dtype=bool)
     time, values = time[~twice], values[~twice]  # the same record again is no jump
+    wrapped = np.abs(np.diff(time) + WRAP) < NEAR_WRAP
+    if wrapped.any():  # a counter of 32 bits that began again
+        time = time + WRAP * np.concatenate([[0.0], np.cumsum(wrapped)])
     whole = len(time)
     if (np.diff(time) < 0.0).any():
         kept = _increasing(time)

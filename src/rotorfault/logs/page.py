@@ -107,7 +107,9 @@ def _facts(found: LogDiagnosis) -> list[Fact]:
         what, look = "cannot tell", "fair"
     facts = [Fact(what, f"{likely(first.probability)}, {percent(first.probability)}", found.verdict, look)]
     if first.rotor is not None and first.loss is not None:
-        facts.append(Fact(f"{first.loss:.0%}", "of its thrust lost", "as the log shows it", look))
+        ends = first.interval
+        how = "as the log shows it" if ends is None else f"{ends[0]:.0%} to {ends[1]:.0%}, 9 times of 10"
+        facts.append(Fact(f"{first.loss:.0%}", "of its thrust lost", how, look))
     if first.rotor is not None and first.onset is not None:
         into = f"{first.onset - found.log.start:.2f} s"
         facts.append(Fact(into, "onset, into the log", f"{first.onset:.2f} s by its clock"))
@@ -123,6 +125,9 @@ def _events(found: LogDiagnosis, zero: float) -> list[Event]:
         if note.alarm:
             events.append(Event(note.time - zero, "switch", f"its own: {note.text}", 0))
     first = found.probable
+    over = next((scan.over for scan in found.scans if scan.over is not None), None)
+    if over is not None and first.onset is not None:
+        events.append(Event(over[0] - zero, "end", f"{over[1]}: the evidence ends", 0))
     if first.rotor is not None and first.onset is not None:
         text = f"{rotor_words(log, first.rotor)} begins to lose thrust"
         events.append(Event(first.onset - zero, "fault", text, first.rotor))
@@ -215,6 +220,9 @@ def _evidence(scans: tuple[Scan, ...], clock: Array, motors: int) -> dict[str, V
         odds = np.exp(logs - most)
         belief[inside] = odds / (np.exp(-most) + odds.sum(axis=1, keepdims=True))
         residual[inside] = scan.residual[rows]
+        if scan.over is not None:  # a crash would look like the loss of any rotor
+            gone = inside & (clock > scan.over[0])
+            evidence[gone], belief[gone], residual[gone] = np.nan, np.nan, np.nan
     alarm = np.full((len(clock), 1), scans[0].threshold)
     about = {"units": "1", "long_name": "logarithm of likelihood that a rotor lost thrust over that of none did"}
     found = {"diagnosis.evidence_against_rotors": Variable(("time", "against"), np.hstack([evidence, alarm]), about)}
@@ -223,6 +231,6 @@ def _evidence(scans: tuple[Scan, ...], clock: Array, motors: int) -> dict[str, V
     about = {"units": "1", "long_name": "what commands do not explain of the motion, in units of command"}
     shown = np.where(np.isfinite(residual), residual, 0.0)
     size = max(6.0 * float(np.median(np.abs(shown))), float(np.quantile(np.abs(shown), 0.97)), 1e-3)
-    clipped = np.clip(shown, -4.0 * size, 4.0 * size)  # a crash would flatten all else
+    clipped = np.clip(np.where(np.isfinite(residual), residual, np.nan), -4.0 * size, 4.0 * size)
     found["diagnosis.residual"] = Variable(("time", "channel"), clipped, about)
     return found

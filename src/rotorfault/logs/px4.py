@@ -27,7 +27,7 @@ WANTED = dict.fromkeys(
         "actuator_controls_0", "actuator_outputs", "actuator_motors", "vehicle_torque_setpoint",
         "vehicle_thrust_setpoint", "vehicle_angular_velocity", "sensor_combined", "vehicle_attitude",
         "vehicle_local_position", "vehicle_acceleration", "esc_status", "failure_detector_status", "battery_status",
-        "vehicle_land_detected", "wind",
+        "vehicle_land_detected", "wind", "actuator_outputs_sim", "sensor_gyro",
     )
 )  # fmt: skip
 FLIP = np.array([1.0, -1.0, -1.0])  # from forward, right, down to forward, left, up
@@ -42,6 +42,8 @@ AIRFRAMES = {
     12: "octaquad-x",
 }  # fmt: skip
 FIRST_FUNCTION = 101  # ACTUATOR_FUNCTION of motor 1
+OUTPUTS = [*(("actuator_outputs", k) for k in range(4)), *(("actuator_outputs_sim", k) for k in range(2))]
+DRIVERS, MOST_OUTPUTS = ("PWM_MAIN", "PWM_AUX", "UAVCAN_EC", "SIM_GZ_EC", "HIL_ACT"), 16  # that have functions
 MOST_ESCS = 8  # that a log has fields for in all versions
 LIFTING = 0.5  # least share of a rotor's thrust that has to point up: cosine of 60 degrees
 
@@ -111,7 +113,9 @@ def _motion(file: ULogFile) -> list[tuple[str, Series | None]]:
     turned = np.array([1.0, 1.0, -1.0, -1.0])
     return [
         ("rates", first(
-            ("vehicle_angular_velocity", _indexed("xyz", 3), FLIP), ("sensor_combined", _indexed("gyro_rad", 3), FLIP)
+            ("vehicle_angular_velocity", _indexed("xyz", 3), FLIP),
+            ("sensor_combined", _indexed("gyro_rad", 3), FLIP),
+            ("sensor_gyro", ("x", "y", "z"), FLIP),
         )),
         ("attitude", first(("vehicle_attitude", _indexed("q", 4), turned))),
         ("position", first(("vehicle_local_position", ("x", "y", "z"), FLIP))),
@@ -265,9 +269,9 @@ def _output(file: ULogFile, count: int) -> _Output | None:
     if (motors := _stopped(file, count)) is not None:
         return motors
     best: Series | None = None
-    for instance in range(4):  # of the output drivers, the one whose channels move like motors
-        topic = file.topics.get(("actuator_outputs", instance))
-        fields = _indexed("output", min(count, 16))
+    fields = [f"output[{k}]" for k in _channels(file.parameters, count)]
+    for name, instance in OUTPUTS:  # of the output drivers, the one whose channels move like motors
+        topic = file.topics.get((name, instance))
         if topic is None or not len(topic.rows) or not _has(topic, fields):
             continue
         table = topic.rows.table()
@@ -287,6 +291,15 @@ def _output(file: ULogFile, count: int) -> _Output | None:
     curve = min(max(file.parameters.get("THR_MDL_FAC", 0.0), 0.0), 1.0)
     sent = Series(best.time, share_of(signal, curve))
     return _Output(sent, np.zeros(sent.values.shape, dtype=bool))
+
+
+def _channels(parameters: Mapping[str, float], count: int) -> list[int]:
+    """The output of each motor, from 0: by the functions of the driver that has all motors, else in their order."""
+    for family in DRIVERS:
+        function = {parameters.get(f"{family}_FUNC{k + 1}", 0.0): k for k in range(MOST_OUTPUTS - 1, -1, -1)}
+        if all(FIRST_FUNCTION + k in function for k in range(count)):
+            return [function[FIRST_FUNCTION + k] for k in range(count)]
+    return list(range(min(count, MOST_OUTPUTS)))
 
 
 def _notes(file: ULogFile, count: int) -> tuple[Note, ...]:

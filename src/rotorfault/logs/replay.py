@@ -19,7 +19,7 @@ from rotorfault.base.foreign import is_own
 from rotorfault.engine import have_simd
 from rotorfault.engine.structure import describe
 from rotorfault.maths.arrays import Array
-from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.geometry import PerRotor, zeros
 from rotorfault.maths.records import flatten, unflatten
 from rotorfault.maths.rotation import Quat
 from rotorfault.maths.scalar import Scalar

@@ -54,6 +54,7 @@ class Scan(NamedTuple):
     free: float  # the same of a push in any direction
     settled: float | None  # loss by what commands settle at, where the flight goes on calmly
     interval: tuple[float, float] = (0.0, 1.0)  # that holds the loss 9 times of 10
+    over: tuple[float, str] | None = None  # s, when the vehicle flies no more behind the onset, and why
 
 
 def threshold_of(block: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotorfault.logs.baseline import Baseline
 from rotorfault.logs.detectors import Said
-from rotorfault.logs.dynamics import G
+from rotorfault.logs.dynamics import G, block_length
 from rotorfault.logs.forced import short_of
 from rotorfault.logs.log import Log, when
 from rotorfault.logs.scan import Scan
@@ -69,7 +69,9 @@ def sudden_evidence(log: Log, scan: Scan, rotor: int) -> str:
     odds = f"evidence {scan.scores[rotor]:.1f} of {scan.threshold:.1f} that are an alarm, in logarithms of likelihood"
     if rotor != scan.rotor or scan.onset is None:
         return odds
-    said = [f"the body turned as if it pulled less from {when(log, scan.onset)}", odds]
+    resting = block_length(log) is None
+    how = "in hover it is asked for more" if resting else "the body turned as if it pulled less"
+    said = [f"{how} from {when(log, scan.onset)}", odds]
     if scan.alarm is not None:
         said.append(f"certain {max(scan.alarm - scan.onset, 0.0):.2f} s later")
     if (sent := short_of(log, scan.onset, rotor)) is not None:

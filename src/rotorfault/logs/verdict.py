@@ -110,6 +110,7 @@ class LogDiagnosis:
             "limits": list(self.limits),
             "read": {"lost": self.log.damage.lost, "reason": self.log.damage.reason},
             "alarm": _rounded(self.alarm, 4),
+            "over": _rounded(next((scan.over[0] for scan in self.scans if scan.over is not None), None), 4),
             "start": _rounded(self.log.start, 4),
             "duration": _rounded(self.log.duration, 4),
             "own_messages": list(self.own),

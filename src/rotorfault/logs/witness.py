@@ -1,4 +1,4 @@
-r"""What the registered sources of diagnosis, run over a log, speak for: one witness beside the test of the log itself.
+r"""What the sources of diagnosis that were run over a log speak for: one witness beside the test of the log itself.
 
 A source is right about a log only where the vehicle's numbers and the noise that it believes are those of the log.
 Whether they are is not known before (:math:`P(M) = 1/2`), and the log tells: a source that fits flags nobody while
@@ -65,7 +65,9 @@ def heard(said: Sequence[Said], begin: float, onset: float, rotors: int) -> Hear
         early = sum(begin - 1e-9 <= flag[1] < onset - EARLY for flag in one.flags)
         near = [flag for flag in one.flags if onset - EARLY <= flag[1] <= onset + LATE]
         astray += bool(early)
-        fits, errs = (share * _poisson(early, rate * quiet) for share, rate in zip((FITS, 1.0 - FITS), RATES, strict=True))
+        fits, errs = (
+            share * _poisson(early, rate * quiet) for share, rate in zip((FITS, 1.0 - FITS), RATES, strict=True)
+        )
         chance = 1.0 - math.exp(-RATES[1] * (EARLY + LATE))
         first = near[0][0] - 1 if near else None
         push = fits * (1.0 - PUSHED if first is None else PUSHED / rotors)
