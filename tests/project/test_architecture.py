@@ -70,6 +70,7 @@ LAZY = {
         "rotorfault.engine.simd": "llvmlite need not be installed",
     },
     "rotorfault.engine.taylor": {"heyoka": OPTIONAL},
+    "rotorfault.logs.replay": {"rotorfault.engine.fold": "llvmlite need not be installed"},
     "rotorfault.flight.comparison": {"rotorfault.report.figures": MATPLOTLIB, "rotorfault.flight.view": PAGES},
     "rotorfault.flight.doubts": {
         "rotorfault.analysis.trim": "brings scipy, which takes longer to load than a flight to fly"
