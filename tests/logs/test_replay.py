@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_logs import flown, level, log_of
+from made_up_logs import flown, level, log_of, write_csv
 
 from rotorfault.base.errors import InputError
 from rotorfault.engine import have_simd
 from rotorfault.logs import replay
+from rotorfault.logs.api import diagnose
 from rotorfault.logs.detectors import detector_of, said_by_all
 from rotorfault.logs.log import Log
 from rotorfault.logs.segments import hover_of
@@ -77,3 +78,11 @@ def test_what_is_no_detector_is_refused(place: str, says: str, monkeypatch: pyte
     monkeypatch.chdir(EXAMPLE.parents[1])
     with pytest.raises(InputError, match=says):
         detector_of(place)
+
+
+def test_a_vehicle_or_a_detector_that_is_none_is_refused_whatever_the_log(tmp_path: Path) -> None:
+    path = write_csv(flown(seconds=3.0), tmp_path / "a.csv")
+    with pytest.raises(InputError, match="unknown vehicle"):
+        diagnose(path, vehicle="nosuch")
+    with pytest.raises(InputError, match="needs to know what flew"):
+        diagnose(path, detectors=f"{EXAMPLE}:ParityCheck")

@@ -17,6 +17,7 @@ from rotorfault.logs.log import Log
 from rotorfault.logs.page import page_name, write_diagnosis
 from rotorfault.logs.read import read_log
 from rotorfault.logs.verdict import LogDiagnosis
+from rotorfault.model.vehicle_file import load_vehicle
 
 Paths = str | Path | Sequence[str | Path]
 
@@ -144,8 +145,10 @@ def diagnosed(
     """
     if detectors and vehicle is None:
         raise InputError("a detector needs to know what flew: say it with --vehicle (vehicle= from Python)")
+    if vehicle is not None:
+        load_vehicle(vehicle)  # before anything is read, and also where the log has no flight to run it on
     for place in detectors:
-        detector_of(place)  # before anything is read
+        detector_of(place)
     log = read_log(path)
     others = without(path, baseline_for(log, baseline))
     found = diagnosis_of(log, others, vehicle, detectors)
