@@ -3,12 +3,13 @@
     python benchmarks/detectors.py [--flights 200] [--hours 1] [--vehicles ...] [--detectors ...] [--vibration]
         [--rotor-speeds]
 
-``losses``: hover in gusts of 8 m/s; rotor 2 loses a share at 1.0 to 1.5 s. ``healthy``: hover, 4 m squares with
+``losses``: hover in gusts of 8 m/s; rotor 2 loses a share at 1.0 to 1.5 s. ``stuck``: it sticks at a share of the
+thrust of hover instead. ``healthy``: hover, 4 m squares with
 little time, forward flight at 10 m/s, all in the same gusts, and the last two with a gust front besides. In all of
 them the true vehicle is not the believed one: mass by up to 10 %, inertia by 20 %, lag by 25 %, centre of mass by 1
 cm (at most a quarter of the arm) along x and y. Sensors and estimator are real (`mocap`, `gps-consumer`, `crazyflie`
 with `eskf`), or `noisy` and `direct` with ``--sensors noisy``; ``--vibration`` adds 0.3 rad/s and 5 m/s^2 at the
-rotors' frequency, ``--rotor-speeds`` has the sensors measure them.
+rotors' frequency, ``--rotor-speeds`` has the sensors measure them, on the same flights.
 
 Right is a flight in which the rotor was flagged and no other had been. The interval of false alarms per hour is that
 of a Poisson count, exact, 95 %.
@@ -25,6 +26,8 @@ from scipy.stats import chi2
 
 import rotorfault as rf
 from rotorfault.maths.arrays import Array
+from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.motion import mean_of
 from rotorfault.model.vehicle_file import load_vehicle
 from rotorfault.scenario.scenario import scenario_from
 
@@ -41,6 +44,7 @@ VEHICLES = {  # preset and sensors
 FIRST = tuple(VEHICLES)[:4]  # those that are flown if none is named
 DETECTORS = ("luenberger", "effectiveness_kalman", "glr", "multiple_model")
 LOSSES = (0.05, 0.1, 0.15, 0.25, 0.5)
+STUCK = (0.0, 0.4, 0.8, 1.1, 1.35, 1.75)  # of the thrust of hover
 HOVER = {"kind": "set_point", "position": [0.0, 0.0, 0.0]}
 SQUARE = {"kind": "square", "amplitude": [2.0, 2.0, 0.5], "period": [4.0, 5.0, 6.0], "time_constant": [0.4] * 3}
 FORWARD = {
@@ -87,20 +91,33 @@ def flown(common: Mapping[str, Any], vary: Mapping[str, Any]) -> Mapping[str, Ar
 
 def losses(vehicle: str, detector: str, chosen: argparse.Namespace) -> None:
     """Print a row for each loss."""
-    n, rng = chosen.flights, np.random.default_rng(7 + chosen.seed)
-    onset = rng.uniform(1.0, 1.5, n)
     for loss in LOSSES:
-        fault = {"kind": "step", "rotor": 2, "time": 1.0, "loss": loss}
-        common = tables(vehicle, detector, chosen) | {"duration": 3.6, "reference": HOVER, "fault": [fault]}
-        columns = mismatch(vehicle, n, 1 + chosen.seed) | {"seed": chosen.seed + np.arange(n), "fault.0.time": onset}
-        table = flown(common, columns)
-        delay = 1e3 * (table["detected.2"] - table["onset.2"])
-        found = np.isfinite(delay) & (delay >= 0.0)
-        right = found & (table["false_alarms"] == 0)
-        median, late = np.percentile(delay[found], (50, 95)) if found.any() else (np.nan, np.nan)
-        missed = 1.0 - found.mean()
-        cells = (f"{100 * right.mean():.1f} %", f"{100 * missed:.1f} %", f"{median:.0f}", f"{late:.0f}")
-        row(vehicle, detector, f"loss {loss:g}", *cells, f"{100 * np.mean(table['survived']):.0f} %")
+        struck(vehicle, detector, f"loss {loss:g}", {"kind": "step", "loss": loss}, chosen)
+
+
+def stuck(vehicle: str, detector: str, chosen: argparse.Namespace) -> None:
+    """Print a row for each thrust at which a rotor sticks."""
+    numbers = load_vehicle(vehicle).vehicle
+    for share in STUCK:
+        thrust = min(share * float(hover_thrust(numbers)[1]), float(mean_of(numbers.thrust_max)))
+        struck(vehicle, detector, f"at {share:g}", {"kind": "stuck", "thrust": thrust}, chosen)
+
+
+def struck(vehicle: str, detector: str, name: str, fault: Mapping[str, Any], chosen: argparse.Namespace) -> None:
+    """Print the row of a fault of rotor 2."""
+    n = chosen.flights
+    onset = np.random.default_rng(7 + chosen.seed).uniform(1.0, 1.5, n)
+    faults = [{"rotor": 2, "time": 1.0, **fault}]
+    common = tables(vehicle, detector, chosen) | {"duration": 3.6, "reference": HOVER, "fault": faults}
+    columns = mismatch(vehicle, n, 1 + chosen.seed) | {"seed": chosen.seed + np.arange(n), "fault.0.time": onset}
+    table = flown(common, columns)
+    delay = 1e3 * (table["detected.2"] - table["onset.2"])
+    found = np.isfinite(delay) & (delay >= 0.0)
+    right = found & (table["false_alarms"] == 0)
+    median, late = np.percentile(delay[found], (50, 95)) if found.any() else (np.nan, np.nan)
+    missed = 1.0 - found.mean()
+    cells = (f"{100 * right.mean():.1f} %", f"{100 * missed:.1f} %", f"{median:.0f}", f"{late:.0f}")
+    row(vehicle, detector, name, *cells, f"{100 * np.mean(table['survived']):.0f} %")
 
 
 def healthy(vehicle: str, detector: str, chosen: argparse.Namespace) -> None:
@@ -145,14 +162,15 @@ def main() -> None:
     parser.add_argument("--sensors", default="real", choices=("real", "noisy"))
     parser.add_argument("--vibration", action="store_true")
     parser.add_argument("--rotor-speeds", action="store_true")
-    parser.add_argument("--only", choices=("losses", "healthy"))
+    parser.add_argument("--only", choices=("losses", "stuck", "healthy"))
     chosen = parser.parse_args()
     for vehicle in chosen.vehicles:
         for detector in chosen.detectors:
-            if chosen.only != "healthy":
-                row("vehicle", "detector", "", "right", "missed", "median [ms]", "95 %", "survived")
-                losses(vehicle, detector, chosen)
-            if chosen.only != "losses":
+            for name, flights in (("losses", losses), ("stuck", stuck)):
+                if chosen.only in (None, name):
+                    row("vehicle", "detector", "", "right", "missed", "median [ms]", "95 %", "survived")
+                    flights(vehicle, detector, chosen)
+            if chosen.only in (None, "healthy"):
                 row("vehicle", "detector", "healthy", "alarms", "hours", "per hour", "", "survived")
                 healthy(vehicle, detector, chosen)
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
 from rotorfault.autopilot.diagnosis.glr import Glr, GlrParameters
-from rotorfault.autopilot.diagnosis.kalman import Sparse
+from rotorfault.autopilot.diagnosis.kalman import Hypothesis, Sparse
 from rotorfault.autopilot.diagnosis.multiple_model import MultipleModel, log_ratios
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.prediction import Expectation
@@ -303,7 +303,7 @@ class Watched:
     def windows(self) -> jumps.Windows:
         """As the detectors have them: of one rotor, whose numbers are those of all, by rotor and flight."""
         return tuple(
-            jumps.Window(age, (jumps.Hypothesis((), score, information[:, None]),))
+            jumps.Window(age, (Hypothesis((), score, information[:, None]),))
             for age, score, information in zip(self.age, self.score, self.information, strict=True)
         )
 

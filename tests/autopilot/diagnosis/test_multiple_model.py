@@ -12,7 +12,8 @@ from scipy.stats import norm
 
 import rotorfault as rf
 from rotorfault.autopilot.diagnosis.alarm_rate import HOUR, crossing_threshold, ratio_threshold
-from rotorfault.autopilot.diagnosis.jumps import Hypothesis, Window
+from rotorfault.autopilot.diagnosis.jumps import Window
+from rotorfault.autopilot.diagnosis.kalman import Hypothesis
 from rotorfault.autopilot.diagnosis.multiple_model import log_ratios
 from rotorfault.scenario.scenario import scenario_from
 

@@ -249,3 +249,12 @@ def test_all_vehicles_meet_all_manoeuvres_with_real_sensors(name: str) -> None:
     assert {one[1] for one in sets} == {"mocap", "gps-consumer", "crazyflie"}
     assert {one[2] for one in sets} == {"eskf"}
     assert len(sets) == 6
+
+
+def test_each_detector_flies_with_speeds_and_without() -> None:
+    study = load_study("detection-speeds")
+    first = tuple(axis.case[0] for axis in study.case_axes)
+    flown = [study.scenario_of(variant, first) for variant in range(len(study.variant))]
+    kinds = [(one.diagnosis.kind, one.sensors.settings.rotor_speeds.on) for one in flown]
+    assert sorted(kinds) == sorted((kind, on) for kind in {one[0] for one in kinds} for on in (False, True))
+    assert len(kinds) == 8

@@ -18,7 +18,7 @@ from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, following, verdict
+from rotorfault.autopilot.diagnosis import fault_free, following, standing, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import crossing_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory
 from rotorfault.autopilot.diagnosis.following import FollowingMemory
@@ -92,6 +92,9 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         excess = mean.map(lambda x, v: (x - p.least) / sqrt(maximum(v, fault_free.TINY)), variance)
         evidence = excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
         fresh = verdict.probabilities(evidence, 0.5 * p.threshold * p.threshold, flagged)
+        turns = model.standing if isinstance(model.standing, standing.Standing) else None
+        if turns is not None:
+            fresh = fresh * (1.0 - turns.doubt)
         flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
         still = verdict.still_faulty(mean, variance, p.least)
         flags, _ = verdict.held(flags, new, still, p.clear_persistence, dt)
@@ -105,5 +108,8 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         )
         loss = estimate * flags.flagged
         diagnosis = Diagnosis(loss, flags.flagged, estimate, residual, stuck=stuck, probability=probability)
-        after = EffectivenessMemory(model, flags, judged)
-        return after, diagnosis, GlrSignals(probability, excess, among, stands, stuck.thrust, p.threshold)
+        if turns is not None:
+            diagnosis = standing.told(diagnosis, turns, inputs.expectation.thrust, inputs.vehicle)
+            stands = standing.stands(stands, turns)
+        after, held = EffectivenessMemory(model, flags, judged), diagnosis.stuck.thrust
+        return after, diagnosis, GlrSignals(diagnosis.probability, excess, among, stands, held, p.threshold)

@@ -42,7 +42,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rotorfault.autopilot.diagnosis import air_of_model, learned_lag, sensed, touch
+from rotorfault.autopilot.diagnosis import air_of_model, learned_lag, sensed, standing, touch
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -66,7 +66,7 @@ from rotorfault.model.mixer import hover_thrust
 from rotorfault.model.motion import mean_bandwidth, mean_of, torque_of_motion, torque_of_turning
 from rotorfault.model.signals import Deviations
 from rotorfault.model.turbulence import EXPECTED_AT, turbulence
-from rotorfault.model.vehicle import Vehicle, lateral_force, over_inertia, rotor_speeds, wrench_of
+from rotorfault.model.vehicle import Vehicle, over_inertia, rotor_speeds, wrench_of
 
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
@@ -96,6 +96,7 @@ class ModelParameters(NamedTuple):
     gyroscope: Scalar  # rad^2/s^2: least variance
     accelerometer: Scalar  # m^2/s^4: least variance
     end: Scalar | tuple[()]  # rad/s: of the gyroscope's range
+    standing: standing.StandingParameters | tuple[()] = ()  # empty where no rotor speeds are measured
 
 
 class ModelMemory(NamedTuple):
@@ -110,6 +111,7 @@ class ModelMemory(NamedTuple):
     noise: Vec3  # rad^2/s^2: variance of the measured rates
     force_noise: Vec3  # m^2/s^4: variance of the measured specific force
     touched: touch.TouchMemory = touch.TouchMemory()
+    standing: standing.Standing | tuple[()] = ()  # what rotor speeds say, where they are measured
 
 
 class Step(NamedTuple):
@@ -120,6 +122,7 @@ class Step(NamedTuple):
     force: tuple[Scalar, ...]  # m/s^2: by which it changes the specific force
     seen: tuple[tuple[Sparse, Innovation], ...]  # rates about x, y, z, and specific force along them, in this order
     noise: Sparse  # variances that were added to the state
+    begun: Scalar = 0.0  # 1 at the instant at which a rotor is known to stand still
 
 
 def model_parameters(settings: ModelSettings, context: Context) -> ModelParameters:
@@ -189,9 +192,9 @@ def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemor
         variance[WIND:MASS] = Vec3.of(variance[WIND:MASS]) + unsure.times(unsure)
     belief = diagonal((*mean, *known), (*variance, *known))
     hover, speed = inputs.expectation.thrust / inputs.vehicle.rotor_gain, inputs.expectation.speed
-    return ModelMemory(
-        belief, hover, speed, none, none, 0.0, Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3)
-    )
+    noise = (Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
+    turns = standing.all_turn(inputs, len(belief.mean), p.standing)
+    return ModelMemory(belief, hover, speed, none, none, 0.0, *noise, standing=turns)
 
 
 def advance(
@@ -221,9 +224,24 @@ def advance(
     """
     p, belief = parameters, within_bounds(memory.belief)
     mean, believed = belief.mean, inputs.vehicle
-    vehicle = with_inertia(learned_lag.with_lag(believed, mean[BANDWIDTH]), Vec3.of(mean[INERTIA:BANDWIDTH]))
-    e, lagged = learned_lag.held(memory.lagged, memory.speed, inputs.expectation, inputs.command, vehicle, period)
+    before, lag, faster, unread, turns = memory.lagged, memory.lag, mean[BANDWIDTH], None, None
+    if isinstance(memory.standing, standing.Standing) and isinstance(p.standing, standing.StandingParameters):
+        turns, unread, told = standing.read(memory.standing, inputs, mean[BANDWIDTH], p.standing, period)
+        faster = turns.speeds.lag + unread * mean[BANDWIDTH]
+        before = before + (lag + memory.curve * (told * 0.5)) * told / believed.rotor_gain
+        lag = lag + memory.curve * told
+    vehicle = with_inertia(learned_lag.with_lag(believed, faster), Vec3.of(mean[INERTIA:BANDWIDTH]))
+    e, lagged = learned_lag.held(before, memory.speed, inputs.expectation, inputs.command, vehicle, period)
     dt = e.elapsed
+    decay = exp(-mean_bandwidth(vehicle) * period)
+    was, lag = lag, lag_sensitivity(lag, e, inputs.command, vehicle, decay)
+    curve = learned_lag.curvature(memory.curve, was, lag, e, inputs.command, vehicle, decay)
+    left = 1.0 - believed_losses(belief, vehicle.rotors)
+    lagging_left, unsure, spun = left, lag, None
+    if turns is not None and unread is not None and isinstance(p.standing, standing.StandingParameters):
+        turns, spun = standing.turning(turns, e, vehicle, p.standing)
+        unread = unread * (1.0 - spun.away)
+        e, lagging_left, unsure = spun.expectation, left * unread, lag * unread
     thrust = e.mean_thrust
     wrench = wrench_of(vehicle, thrust)
     omega_B = (e.previous.omega_B + e.now.omega_B) * 0.5
@@ -232,19 +250,15 @@ def advance(
         turning = turning + torque_of_turning(vehicle, omega_B, e.speed)
     turn = over_inertia(vehicle, wrench.torque_B + turning)
 
-    decay = exp(-mean_bandwidth(vehicle) * period)
-    lag = lag_sensitivity(memory.lag, e, inputs.command, vehicle, decay)
-    curve = learned_lag.curvature(memory.curve, memory.lag, lag, e, inputs.command, vehicle, decay)
-    left = 1.0 - believed_losses(belief, vehicle.rotors)
-    lagged_wrench = wrench_of(vehicle, (memory.lag + lag) * 0.5 * left)
+    lagged_wrench = wrench_of(vehicle, (was + lag) * 0.5 * lagging_left)
     weight = vehicle.mass * vehicle.gravity
     # Thrust that comes later turns later about a shifted centre of mass, too.
     delay = lagged_wrench.thrust / weight
     lagging = over_inertia(vehicle, lagged_wrench.torque_B) + Vec3.of(mean[OFFSETS : OFFSETS + 3]) * delay
-    reacted = Vec3(0.0, 0.0, learned_lag.turned_by_lag(e.thrust, e.speed, lag, vehicle) - memory.reaction)
+    reacted = Vec3(0.0, 0.0, learned_lag.turned_by_lag(e.thrust, e.speed, unsure, vehicle) - memory.reaction)
     # A rotor that gives nothing does not turn the body about a shifted centre of mass either.
     shifted = Vec3.of(mean[OFFSETS : OFFSETS + 3]) * (dt / weight)
-    torque = tuple(_loss_torques(vehicle, thrust, dt, shifted))
+    torque = tuple(learned_lag.loss_torques(vehicle, thrust, dt, shifted))
     less_thrust = (thrust * (1.0 - left)).sum()
     level_W = inputs.estimate.q_WB.matrix().T.rows
     # Force of the air over mass: drag of the own way, and what the wind adds; more on rotors that turn faster.
@@ -263,7 +277,7 @@ def advance(
     noise: dict[int, Scalar] = {}
     wrong = _second_order(vehicle, omega_B, lagging, belief, p)
     felt_B = inputs.estimate.specific_force_B
-    lifts = _lifts(vehicle, e.thrust)
+    lifts = learned_lag.lifts(vehicle, e.thrust)
     upwards = felt_B.z - lifts.z * (1.0 - mean[MASS]) - air_W.dot(level_W[2]) * p.along
     touched, push = touch.pushed(memory.touched, upwards, memory.force_noise.z, p.touch)
     change = turn * dt + reaction(e, vehicle, stuck) + Vec3(0.0, 0.0, blown.yaw)
@@ -284,10 +298,13 @@ def advance(
         known[RATES + axis] = (
             getattr(change, name) + twice - dot({k: x for k, x in row.items() if k in LEARNED}, mean)
         )
-        at_arms = {LEVERS + axis: blown.levers[axis]} if axis < 2 else dict(enumerate(blown.offsets, OFFSETS))
-        row |= at_arms
+        row |= {LEVERS + axis: blown.levers[axis]} if axis < 2 else dict(enumerate(blown.offsets, OFFSETS))
         rows[RATES + axis] = row
         noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name) + getattr(push, name)) * dt + unknown
+    newton: list[tuple[Scalar, Scalar, Scalar]] = []
+    if spun is not None:
+        newton = learned_lag.loss_torques(vehicle, PerRotor.all(-1.0, vehicle.rotors), dt, shifted)
+        noise |= {k: noise[k] + spun.shaken([one[k] for one in newton]) / period for k in range(3)}
     if type(pull) is not float or pull != 0.0:  # a number of a batch, or one that is there
         rows |= {LOSSES + i: {LOSSES + i: -pull * dt} for i in range(vehicle.rotors)}
     noise |= {OFFSETS + k: walk * dt for k, walk in enumerate(p.walk)}
@@ -312,7 +329,7 @@ def advance(
 
     force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
     variances_of_force: list[Scalar] = []
-    later = _lifts(vehicle, lag * left) * (1.0 - mean[MASS])
+    later = learned_lag.lifts(vehicle, lag * lagging_left) * (1.0 - mean[MASS])
     for axis, (felt, lift, late, variance) in enumerate(zip(felt_B, lifts, later, memory.force_noise, strict=True)):
         share = p.along if axis == 2 and vehicle.air != () else 1.0
         # While something pushes neither mass nor wind is learned from it.
@@ -328,18 +345,23 @@ def advance(
         belief = follow(belief, one)
         seen.append((row, one))
         variances_of_force.append(sensed.noise_after(variance, one, p.accelerometer, dt))
-
     # Where the bandwidth has moved to, thrust and sensitivities are others.
-    moved = belief.mean[BANDWIDTH] - mean[BANDWIDTH]
+    moved, begun = belief.mean[BANDWIDTH] - mean[BANDWIDTH], 0.0
+    if turns and spun and unread is not None and isinstance(p.standing, standing.StandingParameters):
+        moved = unread * moved
+        lift = effectiveness(vehicle).thrust / vehicle.mass
+        turns, lacking, begun = standing.decided(turns, spun, rows, seen, newton, lift, p.standing, period)
+        belief = standing.corrected(belief, lacking)
     lagged = lagged + (lag + curve * (0.5 * moved)) * moved / vehicle.rotor_gain
     lag = lag + curve * moved
     speed = rotor_speeds(vehicle, lagged * vehicle.rotor_gain)
-    reacting = learned_lag.turned_by_lag(lagged * vehicle.rotor_gain, speed, lag, vehicle)
     seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
-    after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, touched)
+    unsure = lag if unread is None else lag * unread
+    reacting = learned_lag.turned_by_lag(lagged * vehicle.rotor_gain, speed, unsure, vehicle)
+    after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, touched, turns or ())
     # A loss that is not believed has made the learned inertia wrong: what it turns, it turns over the believed one.
-    lost = tuple(_loss_torques(believed, thrust, dt, shifted))
-    return after, Step(rows, lost, force, tuple(seen), noise)
+    lost = tuple(learned_lag.loss_torques(believed, thrust, dt, shifted))
+    return after, Step(rows, lost, force, tuple(seen), noise, begun)
 
 
 def within_bounds(belief: Belief) -> Belief:
@@ -354,28 +376,6 @@ def within_bounds(belief: Belief) -> Belief:
         mean[k] = clip(mean[k], -MOST_INERTIA, MOST_INERTIA)
     mean[BANDWIDTH] = clip(mean[BANDWIDTH], -learned_lag.MOST, learned_lag.MOST)
     return belief._replace(mean=tuple(mean))
-
-
-def _lifts(vehicle: Vehicle, thrust: PerRotor) -> Vec3:
-    """Specific force in m/s^2 of the rotors along the body axes."""
-    lift = wrench_of(vehicle, thrust).thrust / vehicle.mass
-    if vehicle.tilt == ():
-        return Vec3(0.0, 0.0, lift)
-    side = lateral_force(vehicle, thrust) / vehicle.mass
-    return Vec3(side.x, side.y, lift)
-
-
-def _loss_torques(
-    vehicle: Vehicle, thrust: PerRotor, dt: Scalar, shifted: Vec3
-) -> list[tuple[Scalar, Scalar, Scalar]]:
-    """By what in rad/s the rates change over a period if each rotor gives nothing."""
-    matrix = effectiveness(vehicle)
-    columns = zip(matrix.roll, matrix.pitch, matrix.yaw, strict=True)
-    turns = (over_inertia(vehicle, Vec3(*column)) for column in columns)
-    return [
-        tuple(-f * (dt * g + d) for g, d in zip(turn, shifted, strict=True))
-        for f, turn in zip(thrust, turns, strict=True)
-    ]
 
 
 def _second_order(vehicle: Vehicle, omega_B: Vec3, lagging: Vec3, belief: Belief, p: ModelParameters) -> Vec3:

@@ -17,7 +17,7 @@ from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, following, jumps, verdict
+from rotorfault.autopilot.diagnosis import fault_free, following, jumps, standing, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import windows_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters
 from rotorfault.autopilot.diagnosis.following import FollowingMemory, FollowingParameters
@@ -131,6 +131,9 @@ def start(settings: GlrSettings, context: Context, length: tuple[float, ...], th
         At which a rotor alone is flagged.
     """
     s, model = settings, fault_free.model_parameters(settings.model, context)
+    shares = (s.model.mass, s.model.bandwidth)
+    read = standing.standing_parameters(context, s.false_alarms, shares, s.persistence, s.clear_persistence)
+    model = model._replace(standing=read)
     stuck = following.following_parameters(context, model, s.drift**2)
     return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence, stuck)
 
@@ -160,15 +163,22 @@ def found_and_followed(
     windows = jumps.watch(memory.windows, p.length, step, dt)
     found = jumps.best(windows, p.least)
     fresh = verdict.probabilities(evidence(windows, found), p.threshold, flagged)
+    turns = model.standing if isinstance(model.standing, standing.Standing) else None
+    if turns is not None:
+        fresh = fresh * (1.0 - turns.doubt)
     flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
     belief = jumps.believe(model.belief, windows, found, new)
-    windows = jumps.begun_anew(windows, 1.0 - new.sum())
+    windows = jumps.begun_anew(windows, 1.0 - (new.sum() if turns is None else maximum(new.sum(), step.begun)))
     flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
     judged, stuck, stands = following.follows(memory.following, belief, flags.flagged, inputs, p.following, dt)
     diagnosis = diagnosis._replace(stuck=stuck)
+    if turns is not None:
+        diagnosis = standing.told(diagnosis, turns, inputs.expectation.thrust, inputs.vehicle)
+        stands = standing.stands(stands, turns)
     after = GlrMemory(model._replace(belief=belief), windows, flags, judged)
     among = verdict.fewest(fresh).map(maximum, flags.flagged)
-    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, stands, stuck.thrust, p.threshold)
+    held = diagnosis.stuck.thrust
+    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, stands, held, p.threshold)
 
 
 def conclude(

@@ -34,7 +34,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, RATES, Step
-from rotorfault.autopilot.diagnosis.kalman import Belief, dot
+from rotorfault.autopilot.diagnosis.kalman import Belief, Hypothesis, follow_hypothesis
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
 from rotorfault.maths.scalar import Scalar, greater_equal, maximum, select, sqrt
@@ -42,14 +42,6 @@ from rotorfault.maths.scalar import Scalar, greater_equal, maximum, select, sqrt
 SHORTEST = 0.004  # s: between two onsets; about as long as a measured jump of thrust is told from a gust
 DOUBLINGS = 10  # windows, each twice as long as the one before: up to 2.048 s
 TINY = 1e-12  # information below which nothing is known of a loss
-
-
-class Hypothesis(NamedTuple):
-    """That a rotor has lost thrust since the window began."""
-
-    error: tuple[Scalar, ...]  # of the filter's state, per loss
-    score: Scalar  # d
-    information: Scalar  # C
 
 
 class Window(NamedTuple):
@@ -112,21 +104,9 @@ def watch(windows: Windows, length: tuple[Scalar, ...], step: Step, dt: Scalar) 
 
 
 def _one(hypothesis: Hypothesis, rotor: int, step: Step) -> Hypothesis:
-    error = list(hypothesis.error)
-    for i, row in step.rows.items():
-        error[i] = error[i] + dot(row, hypothesis.error) + step.torque[rotor][i - RATES]
-    score, information = hypothesis.score, hypothesis.information
-    *_, last = step.seen  # specific force along z
-    for pair in step.seen:
-        row, seen = pair
-        shown = dot(row, error)
-        if pair is last:
-            shown = shown + step.force[rotor]
-        over = shown / seen.variance
-        score = score + over * seen.value
-        information = information + over * shown
-        error = [x - gain * shown for x, gain in zip(error, seen.gain, strict=True)]
-    return Hypothesis(tuple(error), score, information)
+    """That a rotor has lost thrust since the window began; the error is per loss."""
+    torque = {RATES + axis: turned for axis, turned in enumerate(step.torque[rotor])}
+    return follow_hypothesis(hypothesis, step.rows, torque, step.seen, step.force[rotor])
 
 
 class Best(NamedTuple):

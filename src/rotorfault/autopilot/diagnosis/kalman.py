@@ -135,3 +135,53 @@ def follow(belief: Belief, seen: Innovation) -> Belief:
     )
     assert n == len(gain)
     return Belief(mean, tuple(rows))
+
+
+class Hypothesis(NamedTuple):
+    """That something moves the state that the filter does not know of.
+
+    Of an input of size 1 the innovations have the mean g; of their variance S follow score d and information C.
+    """
+
+    error: tuple[Scalar, ...]  # of the filter's state
+    score: Scalar  # d, the sum of g nu / S
+    information: Scalar  # C, the sum of g^2 / S
+
+
+def follow_hypothesis(
+    hypothesis: Hypothesis,
+    rows: Mapping[int, Sparse],
+    added: Sparse,
+    seen: Sequence[tuple[Sparse, Innovation]],
+    felt: Scalar,
+) -> Hypothesis:
+    """A hypothesis after one sampling instant of the filter.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    rows : mapping of int to Sparse
+        Of Phi - I, as in `predict`.
+    added : Sparse
+        What the input adds to elements that move.
+    seen : sequence of (Sparse, Innovation)
+        Rows of what was measured, one after another, and what that said.
+    felt : scalar
+        What the input adds to the last of the measured numbers.
+    """
+    error = list(hypothesis.error)
+    for i, row in rows.items():
+        moved = error[i] + dot(row, hypothesis.error)
+        error[i] = moved + added[i] if i in added else moved
+    score, information = hypothesis.score, hypothesis.information
+    *_, last = seen
+    for pair in seen:
+        row, one = pair
+        shown = dot(row, error)
+        if pair is last:
+            shown = shown + felt
+        over = shown / one.variance
+        score = score + over * one.value
+        information = information + over * shown
+        error = [x - gain * shown for x, gain in zip(error, one.gain, strict=True)]
+    return Hypothesis(tuple(error), score, information)

@@ -12,30 +12,41 @@ Kalman filter that is linearised where its estimate is, and not where that was w
 
 from __future__ import annotations
 
+import operator
+
 from rotorfault.autopilot.prediction import Expectation
-from rotorfault.maths.geometry import PerRotor, Vec3
+from rotorfault.maths.geometry import PerRotor, Vec3, per_rotor
 from rotorfault.maths.scalar import Scalar, absolute, exp, maximum
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import lag_bandwidth, lag_held, limited
-from rotorfault.model.vehicle import Vehicle, rate_against_rotors, residual_speed, rotor_speeds
+from rotorfault.model.vehicle import (
+    Vehicle,
+    lateral_force,
+    over_inertia,
+    rate_against_rotors,
+    residual_speed,
+    rotor_speeds,
+    wrench_of,
+)
 
 TINY = 1e-12  # N: thrust of a rotor that stands
 MOST = 1.0  # of the logarithm: a bandwidth that is more than e times another is no wrong model of it
 
 
-def with_lag(vehicle: Vehicle, learned: Scalar) -> Vehicle:
+def with_lag(vehicle: Vehicle, learned: PerRotor | Scalar) -> Vehicle:
     """The believed vehicle with rotors that are faster.
 
     Parameters
     ----------
     vehicle : Vehicle
-    learned : scalar
+    learned : scalar, or PerRotor where it is known of each
         Logarithm of the bandwidth over the believed one, up to `MOST` in size.
     """
-    factor = exp(learned)
-    faster = vehicle._replace(rotor_bandwidth=vehicle.rotor_bandwidth * factor)
+    factor = per_rotor(exp, learned)
+    faster = vehicle._replace(rotor_bandwidth=per_rotor(operator.mul, vehicle.rotor_bandwidth, factor))
     if isinstance(vehicle.rotor_bandwidth_down, tuple):
         return faster
-    return faster._replace(rotor_bandwidth_down=vehicle.rotor_bandwidth_down * factor)
+    return faster._replace(rotor_bandwidth_down=per_rotor(operator.mul, vehicle.rotor_bandwidth_down, factor))
 
 
 def held(
@@ -125,3 +136,36 @@ def turned_by_lag(thrust: PerRotor, speed: PerRotor, lag: PerRotor, vehicle: Veh
     faster = speed.map(lambda omega, s, size: absolute(omega) * (0.5 * s / size), lag, sizes)
     residual = residual_speed(vehicle, faster)
     return -rate_against_rotors(vehicle, residual.z if isinstance(residual, Vec3) else residual)
+
+
+def lifts(vehicle: Vehicle, thrust: PerRotor) -> Vec3:
+    """Specific force in m/s^2 of the rotors along the body axes, for thrusts in N."""
+    lift = wrench_of(vehicle, thrust).thrust / vehicle.mass
+    if vehicle.tilt == ():
+        return Vec3(0.0, 0.0, lift)
+    side = lateral_force(vehicle, thrust) / vehicle.mass
+    return Vec3(side.x, side.y, lift)
+
+
+def loss_torques(
+    vehicle: Vehicle, thrust: PerRotor, dt: Scalar, shifted: Vec3
+) -> list[tuple[Scalar, Scalar, Scalar]]:
+    """By what in rad/s the rates change over a period if each rotor gives nothing.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    thrust : PerRotor, N
+        Of sound rotors.
+    dt : scalar, s
+        Of the period.
+    shifted : Vec3, rad/s/N
+        By which a newton of thrust turns the body for its shifted centre of mass.
+    """
+    matrix = effectiveness(vehicle)
+    columns = zip(matrix.roll, matrix.pitch, matrix.yaw, strict=True)
+    turns = (over_inertia(vehicle, Vec3(*column)) for column in columns)
+    return [
+        tuple(-f * (dt * g + d) for g, d in zip(turn, shifted, strict=True))
+        for f, turn in zip(thrust, turns, strict=True)
+    ]

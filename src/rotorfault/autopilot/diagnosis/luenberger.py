@@ -30,7 +30,7 @@ from typing import Annotated, Literal, NamedTuple, final
 
 from pydantic import Field, field_validator
 
-from rotorfault.autopilot.diagnosis import sensed
+from rotorfault.autopilot.diagnosis import observed_speeds, sensed, standing
 from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
@@ -80,6 +80,7 @@ Form = Literal["injected", "linear", "lag_states"]
 # fivefold at most.
 LEAST_COSINE = 0.2
 SHOWN = 4.0  # time constants until an exponential has shown 98 % of where it goes
+QUIET = 0.002  # rad/s: noise of a rate at an instant, if the sensors say less; as of the other detectors
 FASTEST_POLE = 30.0  # per sampling period: exp(-30) = 1e-13 is zero beside 1 but for rounding
 
 
@@ -110,6 +111,8 @@ class LuenbergerParameters(NamedTuple):
     dynamics: Dynamics  # L_1, innovation to rate, and L_2, to deviation acceleration, and what follows from them
     decision: DecisionParameters
     end: Scalar | tuple[()] = ()  # rad/s: of the gyroscope's range
+    standing: standing.StandingParameters | tuple[()] = ()  # empty where no rotor speeds are measured
+    rates: Scalar | tuple[()] = ()  # rad^2/s^2: least variance of a measured rate; empty likewise
 
 
 class LuenbergerSignals(NamedTuple):
@@ -132,6 +135,7 @@ class LuenbergerMemory(NamedTuple):
     decision: DecisionMemory
     stuck: PerRotor  # 1 where a rotor was last believed not to follow
     unread: Vec3 | tuple[()]  # 1 for an axis whose rate was not read at the last instant; empty if all always are
+    rotors: standing.Standing | tuple[()] = ()  # as they turn; empty where no rotor speeds are measured
 
 
 def place(carry: float, decay: float, targets: tuple[float, float]) -> tuple[float, float]:
@@ -195,7 +199,12 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         shown, decision = SHOWN / min(p, q), self.settings.decision
         stuck = StuckParameters(shown, decision.clear_threshold)
         decided = decision_parameters(decision, 1.0 / p + 1.0 / q, SHOWN / w + shown, stuck)
-        return LuenbergerParameters(carry, decay, dynamics, decided, sensed.end_of_range(context))
+        speeds = standing.standing_parameters(
+            context, observed_speeds.FALSE_ALARMS, (observed_speeds.MASS, decision.bandwidth), decision.persistence,
+            decision.clear_persistence,
+        )  # fmt: skip
+        least: Scalar | tuple[()] = sensed.variance(context, "rates", QUIET) if speeds else ()
+        return LuenbergerParameters(carry, decay, dynamics, decided, sensed.end_of_range(context), speeds, least)
 
     def initial(self, inputs: DiagnosisInputs, parameters: LuenbergerParameters) -> LuenbergerMemory:
         """Start at the estimated rates without deviation."""
@@ -209,12 +218,17 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             undecided(inputs.vehicle.rotors, hover_thrust(inputs.vehicle).sum() / inputs.vehicle.rotors),
             PerRotor.all(0.0, inputs.vehicle.rotors),
             () if sensed.unread(inputs, parameters.end) is None else zeros(),
+            standing.all_turn(inputs, observed_speeds.STATES, parameters.standing),
         )
 
     def step(
         self, memory: LuenbergerMemory, inputs: DiagnosisInputs, parameters: LuenbergerParameters, dt: Scalar
     ) -> tuple[LuenbergerMemory, Diagnosis, Record]:
         """One sampling instant."""
+        sound, rotors, spun, seen = inputs.expectation.thrust, memory.rotors, None, parameters.standing
+        if isinstance(rotors, standing.Standing) and isinstance(seen, standing.StandingParameters):
+            rotors, spun = observed_speeds.turning(rotors, inputs, seen, dt)
+            inputs = inputs._replace(expectation=spun.expectation)
         vehicle, elapsed, now = inputs.vehicle, inputs.expectation.elapsed, inputs.estimate
         dynamics = parameters.dynamics
         cosine, climb_change, omega_change = self._model(inputs)
@@ -242,8 +256,22 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         delta_z = delta_z + dynamics.gain_deviation * innovation_z * upwards
         delta_omega = delta_omega + innovation * dynamics.gain_deviation
         wrong = follow(memory.model_error, inputs.expectation, inputs.command, innovation, vehicle, dynamics)
+        rates = None
+        if spun is not None:
+            assert isinstance(rotors, standing.Standing)
+            assert isinstance(seen, standing.StandingParameters)
+            least = parameters.rates
+            noise = memory.model_error.noise.map(lambda x: maximum(x, least))
+            if unread is not None:
+                noise = noise + unread * observed_speeds.BLIND
+            rotors, rates, lacking = observed_speeds.decided(
+                rotors, spun, inputs, innovation, noise, (carry, parameters.decay), dynamics, seen, dt
+            )
+            delta_omega = delta_omega + lacking
         deviation = Wrench(vehicle.mass * delta_z, body_momentum(vehicle, delta_omega))
         evidence = self._evidence(deviation, wrong, memory.decision.flagged, inputs, parameters)
+        if isinstance(rotors, standing.Standing):
+            evidence = evidence._replace(residual=evidence.residual * (1.0 - rotors.doubt))
         decision, diagnosis, threshold = decide(memory.decision, evidence, vehicle, parameters.decision, dt)
         after = LuenbergerMemory(
             climb=climb + dynamics.gain_rate * innovation_z,
@@ -255,7 +283,11 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
             decision=decision,
             stuck=diagnosis.stuck.rotor,
             unread=() if unread is None else unread,
+            rotors=rotors,
         )
+        if isinstance(rotors, standing.Standing) and rates is not None:
+            after = after._replace(omega_B=after.omega_B + rates)
+            diagnosis = standing.told(diagnosis, rotors, sound, vehicle)
         return after, diagnosis, LuenbergerSignals(threshold, diagnosis.test, diagnosis.stuck.thrust)
 
     @staticmethod

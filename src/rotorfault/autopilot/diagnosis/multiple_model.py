@@ -38,6 +38,7 @@ from rotorfault.autopilot.diagnosis.glr import (
     found_and_followed,
     start,
 )
+from rotorfault.autopilot.diagnosis.kalman import Hypothesis
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.scalar import Scalar, exp, log, maximum, sqrt
@@ -118,7 +119,7 @@ def log_ratios(windows: jumps.Windows, least: Scalar, precision: Scalar) -> PerR
     return PerRotor.of(found)
 
 
-def _log_ratio(hypothesis: jumps.Hypothesis, least: Scalar, precision: Scalar) -> tuple[Scalar, Scalar]:
+def _log_ratio(hypothesis: Hypothesis, least: Scalar, precision: Scalar) -> tuple[Scalar, Scalar]:
     """Exponent of the likelihood ratio, and the factor before it, squared below."""
     information = hypothesis.information
     score = maximum(hypothesis.score - least * information, 0.0)
