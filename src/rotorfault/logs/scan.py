@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rotorfault.base.progress import Bar
 from rotorfault.logs.dynamics import UNEVEN, Residual
 from rotorfault.logs.weighing import ratio, weighed
 from rotorfault.maths.arrays import Array
@@ -34,6 +35,7 @@ LASTING, PASSING = 0.05, 8  # loss below which what was found has passed, and ho
 EXPLAINED = 1.0  # s after an alarm, in which its cause is looked for
 SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)  # s of sums by which the noise is measured
 HOLD = 5.0  # s over which evidence is gathered
+SEEN = 500  # blocks between two looks at progress
 SURE = 1.645  # standard deviations: an interval holds a loss 9 times of 10
 
 
@@ -143,27 +145,30 @@ def _scanned(residual: Residual, rho: Array, noise: tuple[Array, Array]) -> tupl
     best: tuple[int, Array, Array] | None = None
     strongest = 0.0
     previous, signal_before = np.full(4, np.nan), np.zeros((len(LOSSES), motors, 4))
-    for k in range(count):
-        now, doubt = rho[k], residual.doubt[k]
-        usable = np.isfinite(now) & np.isfinite(previous) & np.isfinite(doubt)
-        signal = shapes * residual.command[k][None, :, None]
-        if usable.any():
-            scale = np.sqrt(spread**2 + doubt**2)[usable]
-            plain = ((now - memory * previous)[usable]) / scale
-            onset_ratio = ratio(plain, signal[:, :, usable] / scale).sum(axis=-1)
-            kept = (signal - memory * signal_before)[:, :, usable] / scale
-            carried = sums + ratio(plain, kept).sum(axis=-1)
-            fresh = (onset_ratio > carried) | (k - onsets > hold)
-            sums = np.where(fresh, onset_ratio, carried)
-            onsets = np.where(fresh, k, onsets)
-        evidence[k] = np.maximum(sums.max(axis=0), 0.0)
-        previous, signal_before = now, signal
-        if alarm is None and evidence[k].max() > threshold:
-            alarm = k
-        # An alarm is explained by the most that is known of it within a second.
-        near = alarm is not None and k - alarm <= int(EXPLAINED / residual.block)
-        if (alarm is None or near) and evidence[k].max() > strongest:
-            strongest, best = float(evidence[k].max()), (k, sums.copy(), onsets.copy())
+    with Bar("looking for what begins in flight", count, "blocks") as bar:
+        for k in range(count):
+            if k % SEEN == 0:
+                bar.update(k)
+            now, doubt = rho[k], residual.doubt[k]
+            usable = np.isfinite(now) & np.isfinite(previous) & np.isfinite(doubt)
+            signal = shapes * residual.command[k][None, :, None]
+            if usable.any():
+                scale = np.sqrt(spread**2 + doubt**2)[usable]
+                plain = ((now - memory * previous)[usable]) / scale
+                onset_ratio = ratio(plain, signal[:, :, usable] / scale).sum(axis=-1)
+                kept = (signal - memory * signal_before)[:, :, usable] / scale
+                carried = sums + ratio(plain, kept).sum(axis=-1)
+                fresh = (onset_ratio > carried) | (k - onsets > hold)
+                sums = np.where(fresh, onset_ratio, carried)
+                onsets = np.where(fresh, k, onsets)
+            evidence[k] = np.maximum(sums.max(axis=0), 0.0)
+            previous, signal_before = now, signal
+            if alarm is None and evidence[k].max() > threshold:
+                alarm = k
+            # An alarm is explained by the most that is known of it within a second.
+            near = alarm is not None and k - alarm <= int(EXPLAINED / residual.block)
+            if (alarm is None or near) and evidence[k].max() > strongest:
+                strongest, best = float(evidence[k].max()), (k, sums.copy(), onsets.copy())
     time = residual.time + residual.block
     said = Scan(time, evidence, rho, spread, memory, threshold, None, None, 0.0, None, np.zeros(motors), 0.0, None)
     if best is None:

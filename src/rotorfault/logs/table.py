@@ -17,6 +17,7 @@ import numpy as np
 
 from rotorfault.base.errors import InputError
 from rotorfault.base.plain_text import one_line
+from rotorfault.base.progress import Bar
 from rotorfault.logs.log import Damage, Layout, named_layout
 from rotorfault.logs.stream import content, opened
 from rotorfault.maths.arrays import Array
@@ -78,7 +79,11 @@ def _csv(path: Path) -> Table:
     rows: list[list[float]] = []
     header: list[str] = []
     bad, every, seen, blocks = 0, 1, 0, []
-    with content(path) as log, io.TextIOWrapper(log.file, encoding="utf-8", errors="replace", newline="") as file:
+    with (
+        content(path) as log,
+        io.TextIOWrapper(log.file, encoding="utf-8", errors="replace", newline="") as file,
+        Bar(f"reading {path.name}", path.stat().st_size, "bytes") as bar,
+    ):
         while line := file.readline(LONGEST_LINE):
             if not header:
                 header = _head(line, facts)
@@ -94,6 +99,7 @@ def _csv(path: Path) -> Table:
             if len(rows) >= 20000:
                 blocks.append(np.array(rows, dtype=float))
                 rows = []
+                bar.update(log.file.tell() if log.packed is None else log.packed.at())
                 if sum(map(len, blocks)) * len(header) > 8 * MOST_ROWS:
                     blocks, every = [np.concatenate(blocks)[::2]], 2 * every
         packed = log.said()
