@@ -99,7 +99,7 @@ def relaxed_hover(
         between 0 and 1.
     """
     vehicle = numbers_of_vehicle(vehicle)
-    gone = _dead(vehicle, dead)
+    gone = dead_rotors(vehicle, dead)
     require(reserve, (int, float), "reserve", "a share of the mean thrust, 0 to 1")
     if not 0.0 <= reserve <= 1.0:
         raise InputError(f"reserve: {reserve!r} came; allowed: a share of the mean thrust, 0 to 1")
@@ -149,7 +149,15 @@ def relaxed_lines(hover: RelaxedHover, vehicle: Vehicle) -> list[str]:
     return [f"Relaxed hover, {gone}", *table_lines(rows, "<<", indent=2), *note]
 
 
-def _dead(vehicle: Vehicle, of: Iterable[int]) -> tuple[int, ...]:
+def dead_rotors(vehicle: Vehicle, of: Iterable[int]) -> tuple[int, ...]:
+    """Numbers of dead rotors in order, checked: each there, named once, and one at least that lives.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    of : iterable of int
+        Counted from 1.
+    """
     require(of, Iterable, "dead", "numbers of rotors, such as [1, 3]")
     dead = [whole_number(rotor, "dead rotor", 1, vehicle.rotors) for rotor in of]
     if len({*dead}) != len(dead):

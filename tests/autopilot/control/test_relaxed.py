@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 from cascade_step import cascade
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from rotorfault.analysis.relaxed_hover import relaxed_hover
 from rotorfault.autopilot.allocation.available import least_in_balance
 from rotorfault.autopilot.control.relaxed import (
+    THRUST_WORTH,
     RelaxedAxis,
     RelaxedParameters,
     SpinWeights,
@@ -29,6 +31,7 @@ from rotorfault.autopilot.control.relaxed import (
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
 from rotorfault.model.aerodynamics import still_air
 from rotorfault.model.block import Context
+from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.motion import angular_acceleration
 from rotorfault.model.signals import Stuck, Wrench, healthy
 from rotorfault.model.vehicle import Vehicle, residual_speed, rotor_speeds, wrench_of
@@ -193,3 +196,35 @@ def test_where_thrust_does_not_carry_a_rotor_that_cannot_pull_takes_no_tilt_of_t
     share = [given.torque_B.dot(roll) / roll.dot(roll) for given in (falling, carrying)]
     assert share[0] == pytest.approx(1.0, rel=1e-3)
     assert abs(share[1]) < 0.5
+
+
+@given(
+    name=st.sampled_from(["deadcat", "mueller-2014", "octa-x"]),
+    dead=st.sets(st.integers(1, 4), min_size=1, max_size=3),
+    asked=st.tuples(st.floats(0.2, 2.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
+)
+def test_upside_down_it_is_bounded_least_squares_whoever_is_dead(
+    name: str, dead: set[int], asked: tuple[float, float, float]
+) -> None:
+    """Against SciPy's solver, with rotors dead and with a thousandth of them left: nothing jumps between the two."""
+    vehicle = load_vehicle(name).vehicle
+    rows = effectiveness(vehicle)[:3]
+    weight = float(vehicle.mass * vehicle.gravity)
+    squares = [float(rows[1][i] ** 2 + rows[2][i] ** 2) for i in range(vehicle.rotors)]
+    arm = math.sqrt(sum(squares) / vehicle.rotors)
+    wanted = np.array([asked[0], *(arm * share for share in asked[1:])]) * weight
+    scale = np.array([math.sqrt(THRUST_WORTH) * arm, 1.0, 1.0])
+    B = np.array([[float(row[i]) for i in range(vehicle.rotors)] for row in rows])
+    missed = []
+    for left in (0.0, 1e-3):
+        loss = PerRotor.of((1.0 - left) * float(rotor in dead) for rotor in range(1, vehicle.rotors + 1))
+        believed = healthy(vehicle.rotors)._replace(loss=loss)
+        given = attainable(vehicle, believed, Wrench(wanted[0], Vec3(wanted[1], wanted[2], 0.0)), 1.0)
+        found = np.array([given.thrust, given.torque_B.x, given.torque_B.y], dtype=float)
+        missed.append((found - wanted) * scale)
+        alive = np.array([1.0 - float(x) for x in loss])
+        ends = alive * float(vehicle.thrust_min) - 1e-12, alive * float(vehicle.thrust_max) + 1e-12
+        best = scipy.optimize.lsq_linear(scale[:, None] * B, scale * wanted, ends, tol=1e-12)
+        mine, least = (float(np.linalg.norm(x)) for x in (missed[-1], best.fun))
+        assert mine <= least + 0.02 * arm * weight
+    assert np.linalg.norm(missed[1] - missed[0]) < 0.02 * arm * weight

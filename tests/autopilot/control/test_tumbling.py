@@ -19,6 +19,7 @@ from rotorfault.model.vehicle import Vehicle
 from rotorfault.model.vehicle_file import load_vehicle
 
 rates = st.floats(-30.0, 30.0)
+torques = st.floats(-1.0, 1.0)
 
 
 def mueller() -> Vehicle:
@@ -30,37 +31,49 @@ def without(*dead: int) -> Diagnosis:
     return healthy(4)._replace(loss=loss)
 
 
-@given(p=rates, q=rates, r=rates, tau=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)))
+@given(p=rates, q=rates, r=rates, residual=st.floats(-1500.0, 1500.0), tau=st.tuples(torques, torques))
 def test_only_what_speeds_up_a_rate_that_cannot_be_braked_is_taken(
-    p: float, q: float, r: float, tau: tuple[float, float]
+    p: float, q: float, r: float, residual: float, tau: tuple[float, float]
 ) -> None:
     vehicle, omega, torque = mueller(), Vec3(p, q, r), Vec3(*tau, 0.02)
-    found = without_haste(torque, omega, vehicle, without(1))
-    taken = np.array([torque.x - found.x, torque.y - found.y])
+    found = without_haste(torque, omega, vehicle, without(1), residual)
     assert found.z == torque.z
-    # Along the rate, never against it, and never more than turns an acceleration into none.
     size = math.hypot(p, q)
-    along = (tau[0] * p + tau[1] * q) / max(size, 1e-9)
-    assert np.dot(taken, [p, q]) >= -1e-12
-    assert math.hypot(*taken) <= max(along, 0.0) + 1e-9
+    a = np.array([p, q]) / max(size, 1e-9)
+    beside = np.array([-a[1], a[0]])
+    wanted, kept = np.array(tau), np.array([found.x, found.y])
+    # Along the rate: never more, and never more taken than turns an acceleration into none.
+    along = wanted @ a
     # The rotors that push against it, one by one, from their places: rotors 2, 3 and 4 at their largest.
     places = {2: (0.0, 0.17), 3: (0.17, 0.0), 4: (-0.17, 0.0)}
-    brake = sum(max(0.0, -(y * p - x * q) / max(size, 1e-9)) * 3.8 for x, y in places.values())
+    brake = sum(max(0.0, -(y * a[0] - x * a[1])) * 3.8 for x, y in places.values())
     J, Jz, w0 = 0.0032, 0.0055, 66.67
     most = math.sqrt(2.0 * STOPS_WITHIN * brake / J) + STOPS_WITHIN * abs(r) * Jz / J
     allowed = max(most - size, 0.0) * J * APPROACH * w0
-    assert math.hypot(*taken) == pytest.approx(max(along - allowed, 0.0), abs=1e-3)
+    assert (wanted - kept) @ a == pytest.approx(max(along - allowed, 0.0), abs=1e-3)
+    # Across it all stays within the bound, and nothing does from twice the bound on.
+    across, left = wanted @ beside, kept @ beside
+    if size <= most - 1e-3:
+        assert left == pytest.approx(across, abs=1e-6)
+    if size >= 2.0 * most + 1e-3 and size > 1e-3:
+        pace = (size - most) * J * APPROACH * w0
+        assert abs(left) == pytest.approx(pace, rel=1e-2, abs=1e-3)
+        # The gyroscopic torque of body and rotors, from the cross products.
+        momentum = np.array([J * p, J * q, Jz * r + vehicle.rotor_inertia * residual])
+        gyroscopic = -np.cross([p, q, r], momentum)[:2] @ beside
+        if abs(gyroscopic) > 1e-3:
+            assert np.sign(left) == np.sign(gyroscopic)
 
 
 def test_one_way_is_forbidden_and_the_other_is_not() -> None:
     """Without rotor 1 nothing brakes a roll that rotor 2 has begun; what rotors 3 and 4 turn they stop."""
     vehicle = mueller()
-    begun = without_haste(Vec3(0.3, 0.0, 0.0), Vec3(5.0, 0.0, 0.0), vehicle, without(1))
+    begun = without_haste(Vec3(0.3, 0.0, 0.0), Vec3(5.0, 0.0, 0.0), vehicle, without(1), 0.0)
     assert begun.x == pytest.approx(0.0, abs=1e-6)
     for sign in (1.0, -1.0):
-        turned = without_haste(Vec3(0.0, 0.3 * sign, 0.0), Vec3(0.0, 5.0 * sign, 0.0), vehicle, without(1))
+        turned = without_haste(Vec3(0.0, 0.3 * sign, 0.0), Vec3(0.0, 5.0 * sign, 0.0), vehicle, without(1), 0.0)
         assert turned.y == pytest.approx(0.3 * sign)
-    sound = without_haste(Vec3(0.3, 0.0, 0.0), Vec3(5.0, 0.0, 0.0), vehicle, without())
+    sound = without_haste(Vec3(0.3, 0.0, 0.0), Vec3(5.0, 0.0, 0.0), vehicle, without(), 0.0)
     assert sound.x == pytest.approx(0.3)
 
 

@@ -13,6 +13,7 @@ from gates import needs_simd
 from summary_studies import TOTAL_LOSS
 
 import rotorfault
+from rotorfault.analysis.least_height import least_height
 from rotorfault.analysis.relaxed_hover import relaxed_hover
 from rotorfault.autopilot.control import CONTROLLER
 from rotorfault.base.errors import InputError
@@ -66,6 +67,8 @@ def test_each_number_is_that_of_the_table(flown: Path) -> None:
         assert row["height_lost_p95"] == pytest.approx(float(np.percentile(drop, 95)))
         hovers = relaxed_hover(row["vehicle"], row["rotors_lost"])
         assert row["relaxed_hover"] == hovers.possible
+        least = float(least_height(row["vehicle"], row["rotors_lost"]))
+        assert row["least_height_upside_down"] == (pytest.approx(least) if np.isfinite(least) else None)
 
 
 def test_cells_and_abort_heights_are_those_of_the_table(flown: Path) -> None:

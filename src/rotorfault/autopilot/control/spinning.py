@@ -7,7 +7,7 @@ from typing import final
 from rotorfault.autopilot.allocation.available import HOVER_RESERVE
 from rotorfault.autopilot.control.attitude import AttitudeReference, AttitudeTracking, Wanted
 from rotorfault.autopilot.control.force_limits import LEAST_COSINE, LEAST_THRUST
-from rotorfault.autopilot.control.protocol import ControlInputs, LawOutput
+from rotorfault.autopilot.control.protocol import ControlInputs, LawOutput, TrackingError
 from rotorfault.autopilot.control.relaxed import (
     RelaxedMemory,
     RelaxedParameters,
@@ -33,6 +33,9 @@ FILTER_AHEAD = 4.5
 # Of the rotors' bandwidth, at most: a faster command asks the tilt loop for more than rotors that lag can follow, and
 # costs height. Our choice: half of it, 27 degrees of their phase.
 FOLLOWS = 0.5
+# Slowest pole of the axis over the position loop's crossover, at least: it costs 27 degrees of phase there, as rotors
+# do at FOLLOWS. The axis of a body that turns much faster than its rotors follow is slow, whatever its weights.
+AXIS_AHEAD = 2.0
 
 
 @final
@@ -64,6 +67,7 @@ class Spinning:
             dt,
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
+        self._poles = memory.poles
         self._unexplained_W = unexplained(memory.steady, estimate.v_W)
         # How much the axis points up: 1 if it does, 0 from 73 degrees on.
         to_B = self.axis.to_B
@@ -111,10 +115,28 @@ class Spinning:
         outer : LawOutput
             Of the position loop.
         """
-        k1, k2 = outer.gain_e, outer.gain_rate
-        crosses = sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))
-        wanted = minimum(FILTER_AHEAD * crosses, FOLLOWS * mean_bandwidth(self.inputs.vehicle))
+        wanted = minimum(FILTER_AHEAD * _crossover(outer), FOLLOWS * mean_bandwidth(self.inputs.vehicle))
         return bandwidth + maximum(wanted - bandwidth, 0.0) * (self.axis.free * self._points)
+
+    def held_back(self, outer: LawOutput, error: TrackingError) -> Vec3:
+        r"""Commanded acceleration in m/s^2, horizontally of a position loop no faster than the axis can follow.
+
+        The loop's gains go with :math:`\lambda^2` and :math:`\lambda`, which slows it by :math:`\lambda` and leaves
+        its damping. The axis's slowest pole is that of a(s), about a0/a1 where the others are far.
+
+        Parameters
+        ----------
+        outer : LawOutput
+            Of the position loop.
+        error : TrackingError
+            Of position.
+        """
+        b1, b0 = self._poles.b1, self._poles.b0
+        slowest = sqrt((b0.re * b0.re + b0.im * b0.im) / (b1.re * b1.re + b1.im * b1.im))
+        slower = minimum(slowest / (AXIS_AHEAD * _crossover(outer)), 1.0)
+        slower = 1.0 + (slower - 1.0) * self.axis.free
+        less = outer.gain_e @ error.e * (1.0 - slower * slower) + outer.gain_rate @ error.e_dot * (1.0 - slower)
+        return Vec3(outer.u.x + less.x, outer.u.y + less.y, outer.u.z)
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
@@ -156,7 +178,7 @@ class Spinning:
         after, torque_B = relaxed_torque(
             self.axis, self._error, given.torque_B, switching_B, vehicle, residual_speed, self.parameters
         )
-        hastes = without_haste(torque_B, inputs.estimate.omega_B, vehicle, inputs.diagnosis)
+        hastes = without_haste(torque_B, inputs.estimate.omega_B, vehicle, inputs.diagnosis, residual_speed)
         torque_B = torque_B + (hastes - torque_B) * self.axis.free
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
@@ -175,3 +197,9 @@ class Spinning:
         explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
         after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))
         return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
+
+
+def _crossover(outer: LawOutput) -> Scalar:
+    """Of the position loop, horizontally, in rad/s: at most."""
+    k1, k2 = outer.gain_e, outer.gain_rate
+    return sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from rotorfault.analysis.least_height import least_height
 from rotorfault.analysis.relaxed_hover import RelaxedHover, relaxed_hover
 from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.autopilot.diagnosis.protocol import Oracle
@@ -113,7 +114,9 @@ def total_loss(study: Study, table: pa.Table) -> Summary:
             ],
         },
     }
-    return Summary(files, tuple(_lines(rows)), (_table(rows, level), _abort_table(_abort(every))), _figures(flights))
+    return Summary(
+        files, tuple(_lines(rows)), (_table(rows, level), _abort_table(_abort(every), physics)), _figures(flights)
+    )
 
 
 def _flights(study: Study, columns: Mapping[str, Column]) -> tuple[_Flights, dict[Any, Row]]:
@@ -170,12 +173,14 @@ def _height(scenario: Scenario) -> float:
 def _physics(scenario: Scenario, lost: tuple[int, ...]) -> Row:
     """What physics says of a vehicle without some rotors."""
     hover: RelaxedHover = relaxed_hover(scenario.vehicle, lost)
+    least = float(least_height(scenario.vehicle, lost))
     spin = float(np.sqrt(sum(float(x) ** 2 for x in hover.omega_B))) if hover.possible else None
     return {
         "thrust_to_weight": float(scenario.vehicle.thrust_to_weight),
         "relaxed_hover": bool(hover.possible),
         "relaxed_spin": spin,
         "relaxed_reserve": float(hover.reserve) if hover.possible else None,
+        "least_height_upside_down": least if np.isfinite(least) else None,
     }
 
 
@@ -279,22 +284,27 @@ def _table(rows: list[Row], level: float) -> PageTable:
     )  # fmt: skip
 
 
-def _abort_table(rows: list[Row]) -> PageTable:
+def _abort_table(rows: list[Row], of: Mapping[Any, Row]) -> PageTable:
     """Heights of the page."""
 
     def metres(value: float | None, otherwise: str) -> str:
         return otherwise if value is None else f"{value:g} m"
 
+    def least(row: Row) -> float | None:
+        height: float | None = of[row["vehicle"], row["rotors_lost"]]["least_height_upside_down"]
+        return None if height is None else round(height, 2)
+
     return PageTable(
         "How high is high enough",
         "Of the heights that were flown: the greatest from which nothing survived, whatever law (and nothing from "
         f"any below), and the least from which the best law stays up in {100.0 * SURE:g} % of flights (and from all "
-        "above).",
-        ("vehicle", "rotors lost", "start", "diagnosis", "none survive", "enough"),
+        "above). Upside down: less than this no law could lose that starts there at rest, whatever it knows.",
+        ("vehicle", "rotors lost", "start", "diagnosis", "none survive", "enough", "upside down, least"),
         tuple(
             (
                 row["vehicle"], joined(row["rotors_lost"]), row["start"], row["diagnosis"],
                 metres(row["none_survive_at"], "–"), metres(row["enough"], f"more than {max(row['heights']):g} m"),
+                metres(least(row), "without end"),
             )
             for row in rows
         ),
