@@ -220,9 +220,8 @@ class Cascade(Controller[CascadeMemory, CascadeParameters]):
         # Position loop: specific force wanted.
         lag = w0 if six_inputs else parameters.horizontal_lag
         position = _position_error(estimate, reference, inputs.prediction, Vec3(lag, lag, w0))
+        position = position if spinning is None else spinning.held_back(position)
         position_memory, outer = self.law.position(memory.position, position, parameters.law, dt)
-        if spinning is not None:
-            outer = outer._replace(u=spinning.held_back(outer, position))
         gravity_W = Vec3(0.0, 0.0, vehicle.gravity)
         wanted = reference.a_W + outer.u - drag_acceleration(vehicle, -estimate.v_W) + gravity_W
         force_W = limited_force(wanted, available, vehicle, parameters, steady_W)

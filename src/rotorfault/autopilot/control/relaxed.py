@@ -114,6 +114,7 @@ class RelaxedMemory(NamedTuple):
     lean: Vec3  # (n_x, n_y)/n_z, and 0
     poles: Poles  # of the closed loop
     steady: SteadyForce
+    crossover: Scalar  # rad/s: of the position loop, as it was last
 
 
 class RelaxedAxis(NamedTuple):
@@ -156,7 +157,7 @@ def at_rest(parameters: RelaxedParameters, vehicle: Vehicle, v_W: Vec3) -> Relax
     """The body's z axis, the gain of a body that does not spin, and no steady force at a velocity in m/s."""
     weights = parameters.weights
     poles = optimal(SpinProblem(0.0, 0.0, mean_bandwidth(vehicle), weights.angle, weights.rate))
-    return RelaxedMemory(zeros(), poles, SteadyForce(v_W))
+    return RelaxedMemory(zeros(), poles, SteadyForce(v_W), 0.0)
 
 
 def relaxed_axis(

@@ -67,7 +67,7 @@ class Spinning:
             dt,
         )
         self.omega = self.axis.to_B.T @ estimate.omega_B
-        self._poles = memory.poles
+        self._poles, self._crossover = memory.poles, memory.crossover
         self._unexplained_W = unexplained(memory.steady, estimate.v_W)
         # How much the axis points up: 1 if it does, 0 from 73 degrees on.
         to_B = self.axis.to_B
@@ -115,28 +115,29 @@ class Spinning:
         outer : LawOutput
             Of the position loop.
         """
-        wanted = minimum(FILTER_AHEAD * _crossover(outer), FOLLOWS * mean_bandwidth(self.inputs.vehicle))
+        k1, k2 = outer.gain_e, outer.gain_rate
+        crosses = sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))
+        self._crossover = crosses
+        wanted = minimum(FILTER_AHEAD * crosses, FOLLOWS * mean_bandwidth(self.inputs.vehicle))
         return bandwidth + maximum(wanted - bandwidth, 0.0) * (self.axis.free * self._points)
 
-    def held_back(self, outer: LawOutput, error: TrackingError) -> Vec3:
-        r"""Commanded acceleration in m/s^2, horizontally of a position loop no faster than the axis can follow.
+    def held_back(self, error: TrackingError) -> TrackingError:
+        r"""The error that a position loop sees which is no faster, horizontally, than the axis can follow.
 
-        The loop's gains go with :math:`\lambda^2` and :math:`\lambda`, which slows it by :math:`\lambda` and leaves
-        its damping. The axis's slowest pole is that of a(s), about a0/a1 where the others are far.
+        Position by :math:`\lambda^2` and velocity by :math:`\lambda` slow the loop by :math:`\lambda` and leave its
+        damping. The axis's slowest pole is that of a(s), about a0/a1 where the others are far.
 
         Parameters
         ----------
-        outer : LawOutput
-            Of the position loop.
         error : TrackingError
             Of position.
         """
         b1, b0 = self._poles.b1, self._poles.b0
         slowest = sqrt((b0.re * b0.re + b0.im * b0.im) / (b1.re * b1.re + b1.im * b1.im))
-        slower = minimum(slowest / (AXIS_AHEAD * _crossover(outer)), 1.0)
+        slower = minimum(slowest / (AXIS_AHEAD * maximum(self._crossover, 1e-9)), 1.0)
         slower = 1.0 + (slower - 1.0) * self.axis.free
-        less = outer.gain_e @ error.e * (1.0 - slower * slower) + outer.gain_rate @ error.e_dot * (1.0 - slower)
-        return Vec3(outer.u.x + less.x, outer.u.y + less.y, outer.u.z)
+        e, e_dot = error.e * (slower * slower), error.e_dot * slower
+        return error._replace(e=Vec3(e.x, e.y, error.e.z), e_dot=Vec3(e_dot.x, e_dot.y, error.e_dot.z))
 
     def track(
         self, tracking: AttitudeTracking, state: AttitudeReference, R_WB: Mat3, f_W: Vec3, bandwidth: Scalar
@@ -195,11 +196,6 @@ class Spinning:
         thrust = upright.thrust * (1.0 - free + lifts * free)
         lifted_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz) * (given.thrust / vehicle.mass) - Vec3(0.0, 0.0, vehicle.gravity)
         explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
-        after = after._replace(steady=observed(after.steady, self._unexplained_W, explained_W, self.dt))
+        steady = observed(after.steady, self._unexplained_W, explained_W, self.dt)
+        after = after._replace(steady=steady, crossover=self._crossover)
         return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
-
-
-def _crossover(outer: LawOutput) -> Scalar:
-    """Of the position loop, horizontally, in rad/s: at most."""
-    k1, k2 = outer.gain_e, outer.gain_rate
-    return sqrt(maximum(k1.xx, k1.yy) + maximum(k2.xx * k2.xx, k2.yy * k2.yy))
