@@ -73,4 +73,5 @@ def without_haste(
     turns = torque_of_motion(vehicle, omega_B, residual_speed).dot(beside)
     wanted = excess * pace * select(is_less(turns, 0.0), -1.0, 1.0)
     share = minimum(excess / rate * GIVES_WAY, 1.0)
-    return less + beside * ((wanted - less.dot(beside)) * share)
+    eased: Vec3 = less + beside * ((wanted - less.dot(beside)) * share)
+    return eased
