@@ -34,9 +34,13 @@ ONSET = 15.0  # s
 LOSSES = (0.15, 0.2, 0.3, 0.5)
 
 
-def thinned(log: Log, every: int) -> Log:
-    """A log at a lower rate."""
-    series = {name: Series(one.time[::every], one.values[::every]) for name, one in log.series.items()}
+def thinned(log: Log, every: int, gyro: bool = True) -> Log:
+    """A log at a lower rate, and without what tells body rates where these are not wanted."""
+    series = {
+        name: Series(one.time[::every], one.values[::every])
+        for name, one in log.series.items()
+        if gyro or name not in ("rates", "attitude")
+    }
     return Log(log.source, log.kind, log.layout, series, log.parameters)
 
 
@@ -52,7 +56,10 @@ def main() -> int:
     parser.add_argument("--losses", type=int, default=4, metavar="N", help="flights of each vehicle and loss")
     parser.add_argument("--rates", type=int, nargs="+", default=[200, 100, 50, 10], metavar="HZ")
     parser.add_argument("--seed", type=int, default=51000, help="of the first healthy flight; losses add 20000")
+    parser.add_argument("--without-gyro", action="store_true", help="diagnose logs without rates and attitude")
+    parser.add_argument("--onset", type=float, default=ONSET, help="of the losses, s; the flight ends 15 s later")
     chosen = parser.parse_args()
+    gyro = not chosen.without_gyro
     warnings.simplefilter("ignore")
     hours: dict[int, float] = defaultdict(float)
     alarms: dict[int, int] = defaultdict(int)
@@ -64,7 +71,7 @@ def main() -> int:
             still = base | {"fault": [], "duration": 120.0, "wind.wind_at_6m": float(3 * (n % 4))}
             log = flown(still | ({"reference": SINUSOID} if n % 3 == 2 else {}), chosen.seed + 100 * k + n)
             for rate in chosen.rates:
-                slow = thinned(log, 200 // rate)
+                slow = thinned(log, 200 // rate, gyro)
                 found = diagnosis_of(slow)
                 hours[rate] += sum(end - begin for begin, end in flight_spans(slow)) / 3600.0
                 alarms[rate] += sum(scan.alarm is not None for scan in found.scans)
@@ -72,13 +79,13 @@ def main() -> int:
         for n in range(chosen.losses):
             rotor = n % len(rf.load_vehicle(vehicle).rotor) + 1
             for loss in LOSSES:
-                fault = {"kind": "step", "rotor": rotor, "time": ONSET, "loss": loss}
-                faulty = base | {"fault": [fault], "duration": 30.0, "wind.wind_at_6m": 6.0}
+                fault = {"kind": "step", "rotor": rotor, "time": chosen.onset, "loss": loss}
+                faulty = base | {"fault": [fault], "duration": chosen.onset + 15.0, "wind.wind_at_6m": 6.0}
                 log = flown(faulty, chosen.seed + 20000 + 100 * k + n)
                 for rate in chosen.rates:
-                    found = diagnosis_of(thinned(log, 200 // rate))
+                    found = diagnosis_of(thinned(log, 200 // rate, gyro))
                     onset = found.probable.onset
-                    in_time = onset is not None and abs(onset - ONSET) < 1.5
+                    in_time = onset is not None and abs(onset - chosen.onset) < 1.5
                     named[rate, loss, vehicle] = [
                         a + b
                         for a, b in zip(

@@ -93,12 +93,15 @@ def diagnose(
 ) -> None:
     """Say which rotor, if any, a flight log shows to have lost thrust: causes by probability, with their evidence.
 
-    A sudden loss shows in how the body turns against its commands; it takes body rates and commands at 20 Hz or more.
-    A lasting one shows in the commands of steady hover against healthy flights of the same vehicle: give some with
-    --baseline. Wind, a shifted centre of mass, weight and battery are weighed beside it, and what the log cannot tell
-    is said, with what would let it.
+    A sudden loss shows in how the body turns against its commands; it takes body rates and commands at 20 Hz or more,
+    without which what begins in a flight is looked for in hover alone. A lasting one shows in the commands of steady
+    hover against healthy flights of the same vehicle: give some with --baseline. Wind, a shifted centre of mass,
+    weight and battery are weighed beside it, and what the log cannot tell is said, with what would let it. With
+    --vehicle the detectors that fly are run over the log, and count as one witness more.
 
     Examples: rotorfault diagnose flight.ulg    rotorfault diagnose today.bin --baseline monday.bin tuesday.bin
+
+    Detectors: rotorfault diagnose flight.ulg --vehicle x500 --detector mine.py:MyDetector
     """
     from rotorfault.logs.api import baseline_of, diagnosed, write_json, write_pages
 
