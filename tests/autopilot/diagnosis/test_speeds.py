@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rotorfault.autopilot.diagnosis import DiagnosisInputs, speeds
+from rotorfault.autopilot.diagnosis.kalman import Belief, learned_elsewhere
 from rotorfault.autopilot.diagnosis.speeds import SHARE, SpeedMemory, SpeedParameters
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.maths.geometry import PerRotor, zeros
@@ -168,3 +169,20 @@ def test_who_does_not_measure_speeds_has_none_of_it() -> None:
     assert speeds.speed_parameters(Context(VEHICLE, T, SensorModel()), 0.1, 0.1, 0.3) == ()
     once = SensorModel(rotor_speeds=SensorNoise(NOISE, Timing(0)))
     assert speeds.speed_parameters(Context(VEHICLE, T, once), 0.1, 0.1, 0.3) == ()
+
+
+def test_what_is_learned_elsewhere_is_a_measurement_of_all_states() -> None:
+    """As NumPy's filter has it, that measures the element and counts it anew."""
+    p, left, change = 0.09, 0.6, 0.2
+    rows = ((2.0, 0.3, 0.1), (1.0, -0.2), (p,))
+    after = learned_elsewhere(Belief((0.5, -0.1, 0.05), rows), 2, change, left, p)
+    P = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, -0.2], [0.1, -0.2, p]])
+    told = 1.0 - left**2
+    gain = P[:, 2] / (P[2, 2] + p * left**2 / told)
+    mean = np.array([0.5, -0.1, 0.05]) + gain * (change / told - 0.05)
+    P = P - np.outer(gain, P[2])
+    scale = np.diag([1.0, 1.0, 1.0 / left])
+    P, mean = scale @ P @ scale, (mean - [0.0, 0.0, change]) / [1.0, 1.0, left]
+    np.testing.assert_allclose(after.mean, mean, rtol=1e-12)
+    np.testing.assert_allclose([[after.of(i, j) for j in range(3)] for i in range(3)], P, rtol=1e-12)
+    assert after.of(2, 2) == pytest.approx(p)  # what is left is as unknown as it was, in its own measure

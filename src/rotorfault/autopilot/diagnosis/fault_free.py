@@ -226,8 +226,8 @@ def advance(
     mean, believed = belief.mean, inputs.vehicle
     before, lag, faster, unread, turns = memory.lagged, memory.lag, mean[BANDWIDTH], None, None
     if isinstance(memory.standing, standing.Standing) and isinstance(p.standing, standing.StandingParameters):
-        turns, unread, told = standing.read(memory.standing, inputs, mean[BANDWIDTH], p.standing, period)
-        faster = turns.speeds.lag + unread * mean[BANDWIDTH]
+        turns, unread, told, belief = standing.read(memory.standing, inputs, belief, BANDWIDTH, p.standing, period)
+        mean, faster = belief.mean, turns.speeds.lag + unread * belief.mean[BANDWIDTH]
         before = before + (lag + memory.curve * (told * 0.5)) * told / believed.rotor_gain
         lag = lag + memory.curve * told
     vehicle = with_inertia(learned_lag.with_lag(believed, faster), Vec3.of(mean[INERTIA:BANDWIDTH]))

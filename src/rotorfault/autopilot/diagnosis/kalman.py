@@ -185,3 +185,37 @@ def follow_hypothesis(
         information = information + over * shown
         error = [x - gain * shown for x, gain in zip(error, one.gain, strict=True)]
     return Hypothesis(tuple(error), score, information)
+
+
+def learned_elsewhere(belief: Belief, place: int, change: Scalar, left: Scalar, start: Scalar) -> Belief:
+    r"""A state of which somebody else learns an element from other measurements, and keeps what he has learned.
+
+    He began with the variance p that the element had at the start, over which it is counted. Where his mean moves by
+    :math:`\Delta` and the share l of his standard deviation is left, he has measured, with
+    :math:`\epsilon = 1 - l^2`, :math:`\Delta/\epsilon` with the variance :math:`pl^2/\epsilon`. After that the
+    element is what is left of it, over l.
+
+    Parameters
+    ----------
+    belief : Belief
+    place : int
+        Of the element.
+    change : scalar
+        Delta.
+    left : scalar
+        l, greater than 0.
+    start : scalar
+        p.
+    """
+    told = 1.0 - left * left
+    spread = told * belief.of(place, place) + start * left * left
+    gain = [belief.of(k, place) / spread for k in range(len(belief.mean))]
+    beyond = change - told * belief.mean[place]
+    over = [1.0 / left if k == place else 1.0 for k in range(len(gain))]
+    moved = [x + g * beyond for x, g in zip(belief.mean, gain, strict=True)]
+    moved[place] = (moved[place] - change) * over[place]
+    rows = (
+        tuple((x - told * gain[i] * gain[i + k] * spread) * over[i] * over[i + k] for k, x in enumerate(row))
+        for i, row in enumerate(belief.covariance)
+    )
+    return Belief(tuple(moved), tuple(rows))

@@ -25,7 +25,14 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from rotorfault.autopilot.diagnosis import speeds, verdict
-from rotorfault.autopilot.diagnosis.kalman import Belief, Hypothesis, Innovation, Sparse, follow_hypothesis
+from rotorfault.autopilot.diagnosis.kalman import (
+    Belief,
+    Hypothesis,
+    Innovation,
+    Sparse,
+    follow_hypothesis,
+    learned_elsewhere,
+)
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.diagnosis.speeds import SHARE, SpeedMemory, SpeedParameters
 from rotorfault.autopilot.diagnosis.verdict import MOST, VerdictMemory
@@ -133,16 +140,21 @@ def all_turn(
 
 
 def read(
-    memory: Standing, inputs: DiagnosisInputs, beside: Scalar, parameters: StandingParameters, dt: Scalar
-) -> tuple[Standing, PerRotor, PerRotor]:
-    """Read the speeds.
+    memory: Standing, inputs: DiagnosisInputs, belief: Belief, place: int, parameters: StandingParameters, dt: Scalar
+) -> tuple[Standing, PerRotor, PerRotor, Belief]:
+    """Read the speeds, for a filter that learns the bandwidth as well.
+
+    Its state has the logarithm that is unknown to the speeds, over their standard deviation of it; what they tell is
+    told to all of its states.
 
     Parameters
     ----------
     memory : Standing
     inputs : DiagnosisInputs
-    beside : scalar
-        Logarithm of a bandwidth that a filter has learned of what is unknown of the lags.
+    belief : Belief
+        Of the filter.
+    place : int
+        Of that logarithm in it.
     parameters : StandingParameters
     dt : scalar, s
         Sampling period.
@@ -154,12 +166,16 @@ def read(
         Share of what was not known of each lag at the start that still is not.
     told : PerRotor
         By how much the logarithm of each bandwidth has changed, with the filter's share of what is unknown.
+    belief : Belief
+        After what speeds tell.
     """
     was, p = memory.speeds, parameters.speeds
     seen, _ = speeds.read(was, inputs, p, dt)
-    unknown = seen.unknown_lag(p)
-    told = seen.lag - was.lag + (unknown - was.unknown_lag(p)) * beside
-    return memory._replace(speeds=seen), unknown, told
+    before, unknown = was.unknown_lag(p), seen.unknown_lag(p)
+    over = 1.0 / before.sum()
+    after = learned_elsewhere(belief, place, (seen.lag - was.lag).sum() * over, unknown.sum() * over, p.lag)
+    told = seen.lag - was.lag + unknown * after.mean[place] - before * belief.mean[place]
+    return memory._replace(speeds=seen), unknown, told, after
 
 
 def turning(
