@@ -85,7 +85,7 @@ def test_two_rotors_on_an_arm_are_a_set_before_they_are_told_apart() -> None:
         here = [k for k in range(8) if (x[k], y[k]) == (x[rotor - 1], y[rotor - 1])]
         assert set(here) <= set(np.flatnonzero(among))
     flat = predicted(MultipleModel(MultipleModelSettings()), at("octa-x"), struck, np.ones(40))
-    assert np.nanmedian(flat.delay) < 0.5 * np.nanmedian(found.delay)
+    assert np.nanmedian(flat.delay) < 0.7 * np.nanmedian(found.delay)
 
 
 def test_the_observer_is_not_foreseen() -> None:

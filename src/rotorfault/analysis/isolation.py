@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rotorfault.autopilot.diagnosis import fault_free, jumps, verdict
+from rotorfault.autopilot.diagnosis import fault_free, jumps, turning_gusts, verdict
 from rotorfault.autopilot.diagnosis.glr import Glr, GlrParameters
 from rotorfault.autopilot.diagnosis.kalman import Hypothesis, Sparse
 from rotorfault.autopilot.diagnosis.multiple_model import MultipleModel, log_ratios
@@ -143,6 +143,7 @@ def hover(context: Context, common: GlrParameters) -> Hover:
     vehicle, dt = context.vehicle, float(context.period)
     inputs = _at_rest(vehicle, dt)
     memory = fault_free.at_start(inputs, common.model)
+    memory = memory._replace(gusts=turning_gusts.calm(common.model.gusts))
     belief = memory.belief
     n = fault_free.LOSSES
     none = PerRotor.all(0.0, vehicle.rotors)

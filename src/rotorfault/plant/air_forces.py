@@ -69,5 +69,8 @@ def pushed_by_air(
     R_WB = state.q_WB.matrix()
     airspeed_B = R_WB.T @ (state.v_W - air.velocity_W)
     gusts_B = tuple(R_WB.T @ (velocity_W - air.velocity_W) for velocity_W in local_W)
-    force_B, torque_B = air_wrench(vehicle.air, rotor_places(vehicle), speeds, airspeed_B, state.omega_B, gusts_B)
+    turning_B = state.omega_B
+    if isinstance(air.turning_W, Vec3):
+        turning_B = turning_B - R_WB.T @ air.turning_W
+    force_B, torque_B = air_wrench(vehicle.air, rotor_places(vehicle), speeds, airspeed_B, turning_B, gusts_B)
     return R_WB @ force_B, torque_B

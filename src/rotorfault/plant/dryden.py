@@ -14,8 +14,16 @@ and, with the height h above ground (in feet where it is h_ft),
 
 The source is about airplanes, whose airspeed carries them through a frozen field. A multirotor hovers, and the mean
 wind carries the field past it: V is the speed of the mean wind, but at least `airspeed_min`, and h that of the
-settings throughout a flight. u is along the mean wind's horizontal direction, along x if it has none. The gusts of
-the body rates, made for wings, are left out.
+settings throughout a flight. u is along the mean wind's horizontal direction, along x if it has none.
+
+**Gusts that turn.** With `gradients` they differ over the vehicle, whose span is b: the air turns about the wind's
+direction by p with the spectrum of `rotorfault.model.turbulence`, and about the other axes as frozen gusts do that
+are carried past,
+
+.. math:: q = \frac{1}{V}\frac{s}{1 + (4b/\pi V)s}\,w, \qquad r = -\frac{1}{V}\frac{s}{1 + (3b/\pi V)s}\,v
+
+(section 3.7 of the standard, there for wings). They act where air acts at the rotors, through `vehicle.air`: without
+its inflow a vehicle hardly rolls by them. q and r begin at 0, and are as at any time once b has been carried past.
 
 **Discrete in time, without error.** Over a sampling period T the gust is held. With x = T/tau, a = exp(-x),
 c = 1 - a^2, independent standard normal n and all in units of sigma,
@@ -39,15 +47,15 @@ continuous filter, whatever the period, from the first instant on if v and s sta
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, final
 
 from pydantic import Field
 
 from rotorfault.maths.geometry import Vec3, zeros
-from rotorfault.maths.scalar import Scalar, exp, maximum, sqrt
+from rotorfault.maths.scalar import Scalar, exp, log, maximum, sqrt
 from rotorfault.model.block import Context, Nothing, Record, TimeGrid
 from rotorfault.model.slot import register
-from rotorfault.model.turbulence import FOOT, turbulence
+from rotorfault.model.turbulence import FOOT, span, turbulence
 from rotorfault.plant.timed import TimeInputs
 from rotorfault.plant.wind import Air, Wind
 from rotorfault.plant.wind_in_space import InSpace, SpaceNumbers, air_at, space_numbers, too_short, varies
@@ -65,7 +73,16 @@ class DrydenParameters(NamedTuple):
     length_level: Scalar  # m, of u and v
     length_up: Scalar  # m, of w
     period: Scalar  # s
+    span: Scalar  # m, of the vehicle
     space: SpaceNumbers = SpaceNumbers()
+
+
+class Turning(NamedTuple):
+    """How gusts differ over the vehicle."""
+
+    along: Scalar  # p over its sigma
+    across: Scalar  # v, over its sigma, as late as it passes the vehicle
+    up: Scalar  # w, likewise
 
 
 class DrydenMemory(NamedTuple):
@@ -74,6 +91,7 @@ class DrydenMemory(NamedTuple):
     gust: Vec3  # along, across, up, each over its sigma
     across: Scalar  # s of v
     up: Scalar  # s of w
+    turning: Turning | tuple[()] = ()  # where gusts differ over the vehicle
 
 
 class _Filter(NamedTuple):
@@ -99,14 +117,37 @@ class _Filter(NamedTuple):
 
 
 def _filter(length: Scalar, parameters: DrydenParameters, period: Scalar) -> _Filter:
-    airspeed = maximum(parameters.velocity_W.norm(), parameters.airspeed_min)
-    x = airspeed * period / length
+    x = _speed(parameters) * period / length
     a = exp(-x)
     c = 1.0 - a * a
     # sin(2 phi) is between 0 and 1/2: both roots are real, and their difference loses no digits.
     double = x * a / c
     more, less = sqrt(1.0 + double), sqrt(1.0 - double)
     return _Filter(a, c, 0.5 * (more + less), 0.5 * (more - less))
+
+
+def _speed(parameters: DrydenParameters) -> Scalar:
+    """With which gusts are carried past, in m/s."""
+    return maximum(parameters.velocity_W.norm(), parameters.airspeed_min)
+
+
+def _lasting(widths: float, parameters: DrydenParameters, period: Scalar) -> Scalar:
+    """Share that is left a period later of what lasts for some widths of the vehicle over pi V."""
+    return exp(-period * math.pi * _speed(parameters) / (widths * parameters.span))
+
+
+def _turning(memory: DrydenMemory, parameters: DrydenParameters) -> Vec3 | tuple[()]:
+    """How the air over the vehicle turns, in rad/s, world axes; empty where gusts do not differ over it."""
+    p, turning = parameters, memory.turning
+    if turning == ():
+        return ()
+    assert isinstance(turning, Turning)
+    # Of the spectrum's density pi Phi over twice its time 4b/(pi V), whatever the speed.
+    shape = 0.1 * math.pi**2 / (p.length_up * p.span) * exp(log(0.25 * math.pi * p.length_up / p.span) * (1.0 / 3.0))
+    along = turning.along * p.sigma_up * sqrt(shape)
+    side = (memory.gust.z - turning.up) * p.sigma_up * (0.25 * math.pi / p.span)
+    about_z = (turning.across - memory.gust.y) * p.sigma_level * (math.pi / (3.0 * p.span))
+    return Vec3(p.along_x * along - p.along_y * side, p.along_y * along + p.along_x * side, about_z)
 
 
 @final
@@ -136,6 +177,14 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
         airspeed_min: float = Field(
             1.0, ge=0.1, description="least speed with which the gusts are carried past the vehicle [m/s]"
         )
+        gradients: bool = Field(
+            False, description="whether gusts differ over the vehicle, and turn it through its air"
+        )
+
+    def __init__(self, settings: Any = None) -> None:
+        super().__init__(settings)
+        if self.settings.gradients:
+            vars(self).update(normals=4, first_normals=7)  # of this part alone: others draw what they drew
 
     def parameters(self, context: Context) -> DrydenParameters:
         """Mean wind, standard deviations and scale lengths."""
@@ -153,6 +202,7 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
             length_level=gusts.length_level,
             length_up=gusts.length_up,
             period=context.period,
+            span=span(context.vehicle),
             space=space_numbers(s),
         )
 
@@ -162,16 +212,17 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
 
     def initial(self, inputs: TimeInputs, parameters: DrydenParameters) -> DrydenMemory:
         """Memory in its stationary distribution."""
-        gust, other, period = Vec3.of(inputs.normals[:3]), Vec3.of(inputs.normals[3:]), parameters.period
+        gust, other, period = Vec3.of(inputs.normals[:3]), Vec3.of(inputs.normals[3:6]), parameters.period
         level = _filter(parameters.length_level, parameters, period)
         up = _filter(parameters.length_up, parameters, period)
-        return DrydenMemory(gust, level.start(gust.y, other.y), up.start(gust.z, other.z))
+        turning = Turning(inputs.normals[6], gust.y, gust.z) if self.settings.gradients else ()
+        return DrydenMemory(gust, level.start(gust.y, other.y), up.start(gust.z, other.z), turning)
 
     def step(
         self, memory: DrydenMemory, inputs: TimeInputs, parameters: DrydenParameters, dt: Scalar
     ) -> tuple[DrydenMemory, Air, Record]:
         """The gust of the sampling period that begins."""
-        n, (gust, across, above) = Vec3.of(inputs.normals), memory
+        n, (gust, across, above, turning) = Vec3.of(inputs.normals[:3]), memory
         level = _filter(parameters.length_level, parameters, dt)
         up = _filter(parameters.length_up, parameters, dt)
         after = DrydenMemory(
@@ -183,6 +234,14 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
             across=level.first_order(across, n.y),
             up=up.first_order(above, n.z),
         )
+        if isinstance(turning, Turning):
+            fast, slow = _lasting(4.0, parameters, dt), _lasting(3.0, parameters, dt)
+            turning = Turning(
+                fast * turning.along + sqrt(1.0 - fast * fast) * inputs.normals[3],
+                after.gust.y + (turning.across - after.gust.y) * slow,
+                after.gust.z + (turning.up - after.gust.z) * fast,
+            )
+            after = after._replace(turning=turning)
         return after, self.at(inputs.time, after, parameters), Nothing()
 
     def mean_velocity(self, parameters: DrydenParameters) -> Vec3 | None:
@@ -200,7 +259,8 @@ class Dryden(Wind[DrydenMemory, DrydenParameters]):
 
     def at(self, time: Scalar, memory: DrydenMemory, parameters: DrydenParameters) -> Air:
         """Mean wind plus gust."""
-        return Air(parameters.velocity_W + self._gust(memory, parameters), zeros())
+        velocity_W = parameters.velocity_W + self._gust(memory, parameters)
+        return Air(velocity_W, zeros(), _turning(memory, parameters))
 
     @staticmethod
     def _gust(memory: DrydenMemory, parameters: DrydenParameters) -> Vec3:

@@ -29,6 +29,7 @@ class Air(NamedTuple):
 
     velocity_W: Vec3  # m/s, over ground; acts through drag
     acceleration_W: Vec3  # m/s^2, disturbance that acts directly, whatever the vehicle's velocity
+    turning_W: Vec3 | tuple[()] = ()  # rad/s, how the air over the vehicle turns; acts through `vehicle.air`
 
     def __repr__(self) -> str:
         return record_line(self)

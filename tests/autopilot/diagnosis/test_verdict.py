@@ -56,3 +56,13 @@ def test_no_evidence_at_all_is_no_fault() -> None:
 )
 def test_the_fewest_rotors_that_have_the_fault_are_named(probability: tuple[float, ...], named: list[int]) -> None:
     assert [*fewest(PerRotor.of(probability))] == named
+
+
+def test_a_change_of_what_is_believed_competes_with_a_new_fault() -> None:
+    """As where a fault comes and goes: that the faulty rotor is sound looks as if the opposite one were not."""
+    flagged, evidence = PerRotor.of([1.0, 0.0, 0.0, 0.0]), PerRotor.of([24.0, 0.0, 25.0, 0.0])
+    alone = probabilities(evidence, 20.0, flagged)
+    beside = probabilities(evidence, 20.0, flagged, 10.0)
+    assert alone[2] == pytest.approx(99.0 * np.exp(5.0) / (1.0 + 99.0 * np.exp(5.0)), rel=1e-6)
+    assert beside[0] == pytest.approx(np.exp(14.0) / (np.exp(14.0) + np.exp(5.0) + 1.0 / 99.0 + 2e-4), rel=1e-4)
+    assert beside[2] < 1e-3

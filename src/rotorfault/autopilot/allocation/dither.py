@@ -199,7 +199,7 @@ def densities(context: Context, frequencies: list[float], wind: float) -> Array:
     wind : float, m/s
         Whose gusts are expected, at 6 m.
     """
-    gusts = model_parameters(ModelSettings(wind=wind), context).gradient
+    gusts = model_parameters(ModelSettings(wind=wind), context).gusts.most
     measured = gyro_noise(context) ** 2 * float(context.period)
     return np.array([max(float(gusts.x), float(gusts.y)) + measured * f * f for f in frequencies])
 

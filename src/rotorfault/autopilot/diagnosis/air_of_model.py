@@ -18,10 +18,7 @@ from typing import NamedTuple
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute
 from rotorfault.model.mixer import hover_thrust
-from rotorfault.model.turbulence import EXPECTED_AT, turbulence
 from rotorfault.model.vehicle import Vehicle, rotor_speeds
-
-STILL = 1.0  # m/s: least wind that carries gusts past
 
 
 def air_drag(vehicle: Vehicle) -> tuple[float, float]:
@@ -54,23 +51,6 @@ def more_drag(speeds: PerRotor, hover: Scalar, share: Scalar) -> Scalar:
         Of drag that acts at the rotors.
     """
     return 1.0 + share * (speeds.map(absolute).sum() / hover - 1.0)
-
-
-def gust_gradient(wind: float, drag: float, arms: float) -> float:
-    """Density in (N m)^2 s of the torque of gusts that differ from one side of the vehicle to the other.
-
-    Parameters
-    ----------
-    wind : float, m/s
-        Mean wind at 6 m whose gusts are expected.
-    drag : float, N s/m
-    arms : float, m
-        Of the rotors.
-    """
-    gusts, across = turbulence(wind, EXPECTED_AT), 2.0 * arms
-    torque = 0.5 * drag * arms
-    both = (gusts.sigma_up**2 / gusts.length_up, gusts.sigma_level**2 / gusts.length_level)
-    return max(2.0 * across * share for share in both) * torque**2 * 2.0 * across / max(wind, STILL)
 
 
 def lever_rows(vehicle: Vehicle, forward: Scalar, left: Scalar) -> tuple[Scalar, Scalar]:

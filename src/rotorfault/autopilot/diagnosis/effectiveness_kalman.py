@@ -69,7 +69,7 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         """Spreads and threshold."""
         s = self.settings
         threshold = crossing_threshold(s.false_alarms, context.vehicle.rotors, max(RESPONSE, context.period))
-        return EffectivenessParameters(start(s, context, (), threshold), 0.5 * s.drift**2 / s.spread**2)
+        return EffectivenessParameters(start(s, context, (), threshold, threshold), 0.5 * s.drift**2 / s.spread**2)
 
     def initial(self, inputs: DiagnosisInputs, parameters: EffectivenessParameters) -> EffectivenessMemory:
         """Sound rotors, and nothing else known."""
@@ -112,4 +112,5 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
             diagnosis = standing.told(diagnosis, turns, inputs.expectation.thrust, inputs.vehicle)
             stands = standing.stands(stands, turns)
         after, held = EffectivenessMemory(model, flags, judged), diagnosis.stuck.thrust
-        return after, diagnosis, GlrSignals(diagnosis.probability, excess, among, stands, held, p.threshold)
+        shown = diagnosis.probability, excess, among, stands, held, p.threshold, model.gusts.share
+        return after, diagnosis, GlrSignals(*shown)

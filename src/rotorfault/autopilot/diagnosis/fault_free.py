@@ -23,18 +23,15 @@ a body of the learned inertia J, and
   walk: so no velocity has to be known; :math:`e_m`, the share of mass and battery;
 - :math:`\lambda_i`, the losses, each taken to last. They are 0, with no variance, where no fault is believed.
 
-Drag of the rotors turns the body about yaw (`rotorfault.autopilot.diagnosis.air_of_model`). The wind's force walks
-with the increments of Dryden gusts: over times much shorter than :math:`\tau = L/V` a gust of standard deviation
-:math:`\sigma` moves by the variance :math:`2\sigma^2/\tau` per second. From one side of a vehicle to the other, b
-away, it differs by the variance :math:`2\sigma^2b/L` for times of :math:`b/V`: noise of the torque. What is built
-walks over its whole spread in an hour, and the mass, for the battery, in ten minutes.
+Drag of the rotors turns the body about yaw (`rotorfault.autopilot.diagnosis.air_of_model`), gusts turn it any way
+(`rotorfault.autopilot.diagnosis.turning_gusts`). Their force walks as Dryden gusts do: over times much shorter than
+:math:`\tau = L/V` by the variance :math:`2\sigma^2/\tau` per second. What is built walks over its whole spread in an
+hour, and the mass, for the battery, in ten minutes. What pushes the body upwards may turn it:
+`rotorfault.autopilot.diagnosis.touch`. Noise and range of the sensors: `rotorfault.autopilot.diagnosis.sensed`.
 
 The filter is linearised where its estimate is. What that leaves out enters as noise: the square of the lag's share,
 :math:`P_{ww} s` of a size, and products of the rates, by the share by which an inertia may be wrong; each lasts about
 as long as a rotor's lag, so its variance times twice that time is the density.
-
-What pushes the body upwards may turn it: `rotorfault.autopilot.diagnosis.touch`. Noise and range of the sensors:
-`rotorfault.autopilot.diagnosis.sensed`.
 """
 
 from __future__ import annotations
@@ -42,7 +39,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rotorfault.autopilot.diagnosis import air_of_model, learned_lag, sensed, standing, touch
+from rotorfault.autopilot.diagnosis import air_of_model, learned_lag, sensed, standing, touch, turning_gusts
 from rotorfault.autopilot.diagnosis.kalman import (
     Belief,
     Innovation,
@@ -84,7 +81,7 @@ class ModelParameters(NamedTuple):
 
     start: tuple[Scalar, ...]  # variances of the states behind the rates
     walk: tuple[Scalar, ...]  # variances by which they grow per second
-    gradient: Vec3  # rad^2/s^3: density of what gusts turn that differ over the vehicle
+    gusts: turning_gusts.GustParameters
     touch: touch.TouchParameters
     drag: Scalar  # 1/s: drag over airspeed and mass
     at_rotors: Scalar  # share of it that acts at the rotors
@@ -110,6 +107,7 @@ class ModelMemory(NamedTuple):
     reaction: Scalar  # rad/s: of the yaw rate, by the rotors' reaction
     noise: Vec3  # rad^2/s^2: variance of the measured rates
     force_noise: Vec3  # m^2/s^4: variance of the measured specific force
+    gusts: turning_gusts.GustMemory
     touched: touch.TouchMemory = touch.TouchMemory()
     standing: standing.Standing | tuple[()] = ()  # what rotor speeds say, where they are measured
 
@@ -159,7 +157,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
     return ModelParameters(
         start=(*constants, *blows, mass),
         walk=(*(x / SLOW for x in constants), over**2 * level, over**2 * level, over**2 * up, mass / SAG + inflow),
-        gradient=Vec3(*(air_of_model.gust_gradient(s.wind, drag, arms) / (j * j) for j in J)),
+        gusts=turning_gusts.gust_parameters(vehicle, s.wind, drag * max(along, 1.0), context.period),
         touch=touch.touch_parameters(context, arms),
         drag=over,
         at_rotors=1.0 - float(vehicle.linear_drag) / drag if drag > 0.0 else 0.0,
@@ -194,7 +192,7 @@ def at_start(inputs: DiagnosisInputs, parameters: ModelParameters) -> ModelMemor
     hover, speed = inputs.expectation.thrust / inputs.vehicle.rotor_gain, inputs.expectation.speed
     noise = (Vec3(*(p.gyroscope,) * 3), Vec3(*(p.accelerometer,) * 3))
     turns = standing.all_turn(inputs, len(belief.mean), p.standing)
-    return ModelMemory(belief, hover, speed, none, none, 0.0, *noise, standing=turns)
+    return ModelMemory(belief, hover, speed, none, none, 0.0, *noise, turning_gusts.at_worst(), standing=turns)
 
 
 def advance(
@@ -275,7 +273,7 @@ def advance(
         unknown = beyond * p.end * p.end
     rows: dict[int, Sparse] = {}
     noise: dict[int, Scalar] = {}
-    wrong = _second_order(vehicle, omega_B, lagging, belief, p)
+    wrong = _second_order(vehicle, omega_B, lagging, belief, p) + p.gusts.most * memory.gusts.share
     felt_B = inputs.estimate.specific_force_B
     lifts = learned_lag.lifts(vehicle, e.thrust)
     upwards = felt_B.z - lifts.z * (1.0 - mean[MASS]) - air_W.dot(level_W[2]) * p.along
@@ -300,7 +298,7 @@ def advance(
         )
         row |= {LEVERS + axis: blown.levers[axis]} if axis < 2 else dict(enumerate(blown.offsets, OFFSETS))
         rows[RATES + axis] = row
-        noise[RATES + axis] = (getattr(wrong, name) + getattr(p.gradient, name) + getattr(push, name)) * dt + unknown
+        noise[RATES + axis] = (getattr(wrong, name) + getattr(push, name)) * dt + unknown
     newton: list[tuple[Scalar, Scalar, Scalar]] = []
     if spun is not None:
         newton = learned_lag.loss_torques(vehicle, PerRotor.all(-1.0, vehicle.rotors), dt, shifted)
@@ -327,6 +325,7 @@ def advance(
         seen.append((row, one))
         variances.append(sensed.noise_after(variance, one, p.gyroscope, dt * (1.0 - beyond)))
 
+    gusts = turning_gusts.learned(memory.gusts, [one for _, one in seen], p.gusts, dt * (1.0 - beyond))
     force = tuple(-f * up / vehicle.mass for f, up in zip(e.thrust, effectiveness(vehicle).thrust, strict=True))
     variances_of_force: list[Scalar] = []
     later = learned_lag.lifts(vehicle, lag * lagging_left) * (1.0 - mean[MASS])
@@ -358,7 +357,7 @@ def advance(
     seen_noise = (Vec3.of(variances), Vec3.of(variances_of_force))
     unsure = lag if unread is None else lag * unread
     reacting = learned_lag.turned_by_lag(lagged * vehicle.rotor_gain, speed, unsure, vehicle)
-    after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, touched, turns or ())
+    after = ModelMemory(belief, lagged, speed, lag, curve, reacting, *seen_noise, gusts, touched, turns or ())
     # A loss that is not believed has made the learned inertia wrong: what it turns, it turns over the believed one.
     lost = tuple(learned_lag.loss_torques(believed, thrust, dt, shifted))
     return after, Step(rows, lost, force, tuple(seen), noise, begun)

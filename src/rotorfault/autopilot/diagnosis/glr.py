@@ -7,7 +7,8 @@ where that is by the threshold b for the wanted ``false_alarms`` per hour
 :math:`\ln\Lambda_i = \tfrac12\max(z_i, 0)^2` and :math:`\ln A = \tfrac12b^2` in
 `rotorfault.autopilot.diagnosis.verdict`.
 
-A loss that is found becomes a state of the filter, which goes on to follow it.
+A loss that is found becomes a state of the filter, which goes on to follow it. Windows go on to watch it: that it has
+changed at once competes with new faults.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, following, jumps, standing, verdict
-from rotorfault.autopilot.diagnosis.alarm_rate import windows_threshold
+from rotorfault.autopilot.diagnosis import fault_free, following, jumps, slow_losses, standing, turning_gusts, verdict
+from rotorfault.autopilot.diagnosis.alarm_rate import HOUR, windows_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters
 from rotorfault.autopilot.diagnosis.following import FollowingMemory, FollowingParameters
 from rotorfault.autopilot.diagnosis.kalman import Belief
@@ -26,7 +27,7 @@ from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, clip, maximum
+from rotorfault.maths.scalar import Scalar, clip, maximum, select
 from rotorfault.model.block import Context, Record
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.slot import register
@@ -49,6 +50,11 @@ class GlrSettings(Strict):
     )
     model: ModelSettings = Field(default=ModelSettings(), description="what is not known of vehicle, air and sensors")
 
+    @property
+    def rates(self) -> tuple[float, float]:
+        """Per hour: false alarms, and changes of a loss that is believed, one a second."""
+        return self.false_alarms, HOUR
+
 
 class GlrParameters(NamedTuple):
     """Numbers of the detector."""
@@ -56,6 +62,7 @@ class GlrParameters(NamedTuple):
     model: ModelParameters
     length: tuple[Scalar, ...]  # s: of the windows
     threshold: Scalar  # at which a rotor alone is flagged
+    change: Scalar  # at which a believed loss is taken to have changed
     least: Scalar
     drift: Scalar  # 1/s
     persistence: Scalar  # s
@@ -72,6 +79,7 @@ class GlrSignals(NamedTuple):
     stuck: Annotated[PerRotor, Q("1", NO_FRAME, "probability that a flagged rotor does not follow its command")]
     stuck_thrust: Annotated[PerRotor, Q("N", NO_FRAME, "what a rotor gives that is believed not to follow; else 0")]
     level: Annotated[Scalar, Q("1", NO_FRAME, "standard deviations at which one rotor alone is flagged")]
+    gusts: Annotated[Scalar, Q("1", NO_FRAME, "density of the torque by gusts, over that of the strongest expected")]
 
 
 class GlrMemory(NamedTuple):
@@ -79,6 +87,7 @@ class GlrMemory(NamedTuple):
 
     model: ModelMemory
     windows: jumps.Windows
+    slow: slow_losses.Slow
     verdict: verdict.VerdictMemory
     following: FollowingMemory
 
@@ -95,29 +104,46 @@ class Glr(Diagnoser[GlrMemory, GlrParameters]):
         """Spreads, windows and threshold."""
         s = self.settings
         length = jumps.lengths(context.period)
-        threshold = windows_threshold(s.false_alarms, context.vehicle.rotors, length, context.period)
-        return start(s, context, length, threshold)
+        rotors = context.vehicle.rotors
+        threshold, change = (windows_threshold(rate, rotors, length, context.period) for rate in s.rates)
+        return start(s, context, length, threshold, change)
 
     def initial(self, inputs: DiagnosisInputs, parameters: GlrParameters) -> GlrMemory:
         """Nothing is known yet."""
-        model, rotors = fault_free.at_start(inputs, parameters.model), inputs.vehicle.rotors
-        windows = jumps.nothing_seen(len(model.belief.mean), rotors)
-        return GlrMemory(model, windows, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
+        return nothing_found(inputs, parameters)
 
     def step(
         self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: GlrParameters, dt: Scalar
     ) -> tuple[GlrMemory, Diagnosis, Record]:
         """One sampling instant."""
 
-        def evidence(windows: jumps.Windows, found: jumps.Best) -> PerRotor:
+        def evidence(windows: jumps.Windows, found: jumps.Best, flagged: PerRotor) -> PerRotor:
             return found.excess.map(lambda z: 0.5 * maximum(z, 0.0) * maximum(z, 0.0))
 
-        level = parameters._replace(threshold=0.5 * parameters.threshold * parameters.threshold)
+        level = parameters._replace(
+            threshold=0.5 * parameters.threshold * parameters.threshold,
+            change=0.5 * parameters.change * parameters.change,
+        )
         after, diagnosis, signals = found_and_followed(memory, inputs, level, evidence, dt)
         return after, diagnosis, signals._replace(level=parameters.threshold)
 
 
-def start(settings: GlrSettings, context: Context, length: tuple[float, ...], threshold: float) -> GlrParameters:
+def nothing_found(inputs: DiagnosisInputs, parameters: GlrParameters) -> GlrMemory:
+    """Before the first instant.
+
+    Parameters
+    ----------
+    inputs : DiagnosisInputs
+    parameters : GlrParameters
+    """
+    model, rotors = fault_free.at_start(inputs, parameters.model), inputs.vehicle.rotors
+    windows, slow = jumps.nothing_seen(len(model.belief.mean), rotors), slow_losses.at_start(model.belief)
+    return GlrMemory(model, windows, slow, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
+
+
+def start(
+    settings: GlrSettings, context: Context, length: tuple[float, ...], threshold: float, change: float
+) -> GlrParameters:
     """Numbers of the settings.
 
     Parameters
@@ -129,20 +155,23 @@ def start(settings: GlrSettings, context: Context, length: tuple[float, ...], th
         Of the windows.
     threshold : float
         At which a rotor alone is flagged.
+    change : float
+        At which a believed loss is taken to have changed.
     """
     s, model = settings, fault_free.model_parameters(settings.model, context)
     shares = (s.model.mass, s.model.bandwidth)
     read = standing.standing_parameters(context, s.false_alarms, shares, s.persistence, s.clear_persistence)
     model = model._replace(standing=read)
     stuck = following.following_parameters(context, model, s.drift**2)
-    return GlrParameters(model, length, threshold, s.least, s.drift**2, s.persistence, s.clear_persistence, stuck)
+    times = s.persistence, s.clear_persistence
+    return GlrParameters(model, length, threshold, change, s.least, s.drift**2, *times, stuck)
 
 
 def found_and_followed(
     memory: GlrMemory,
     inputs: DiagnosisInputs,
     parameters: GlrParameters,
-    evidence: Callable[[jumps.Windows, jumps.Best], PerRotor],
+    evidence: Callable[[jumps.Windows, jumps.Best, PerRotor], PerRotor],
     dt: Scalar,
 ) -> tuple[GlrMemory, Diagnosis, GlrSignals]:
     """One sampling instant of a detector that watches windows.
@@ -154,31 +183,40 @@ def found_and_followed(
     parameters : GlrParameters
         With the evidence at which a rotor alone is flagged as the threshold.
     evidence : callable
-        Logarithm of the likelihood ratio of a fault of each rotor, from what windows say.
+        Logarithm of the likelihood ratio of a fault of each rotor, from what windows say; of a change, where it is
+        flagged.
     dt : scalar, s
         Sampling period.
     """
     p, flagged = parameters, memory.verdict.flagged
     model, step = fault_free.advance(memory.model, inputs, p.model, flagged * p.drift, memory.following.stands, dt)
     windows = jumps.watch(memory.windows, p.length, step, dt)
-    found = jumps.best(windows, p.least)
-    fresh = verdict.probabilities(evidence(windows, found), p.threshold, flagged)
+    slow = slow_losses.watch(memory.slow, model.belief, p.model, dt)
+    looked = windows + slow_losses.windows(slow, model.belief, p.model, inputs.vehicle)
+    found = jumps.best(looked, p.least, flagged)
+    fresh = verdict.probabilities(evidence(looked, found, flagged), p.threshold, flagged, p.change)
     turns = model.standing if isinstance(model.standing, standing.Standing) else None
     if turns is not None:
         fresh = fresh * (1.0 - turns.doubt)
     flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
-    belief = jumps.believe(model.belief, windows, found, new)
+    fresh = fresh.map(lambda x, on: select(on, 0.0, x), flagged)
+    new = new * (1.0 - flagged)  # the filter follows a change by itself
+    belief = jumps.believe(model.belief, looked, found, new)
     windows = jumps.begun_anew(windows, 1.0 - (new.sum() if turns is None else maximum(new.sum(), step.begun)))
     flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
+    any_flag = flags.flagged.reduce(maximum)
+    slow = slow_losses.begun_anew(slow, belief, any_flag)
+    model = model._replace(gusts=turning_gusts.beside_a_loss(model.gusts, any_flag))
     judged, stuck, stands = following.follows(memory.following, belief, flags.flagged, inputs, p.following, dt)
     diagnosis = diagnosis._replace(stuck=stuck)
     if turns is not None:
         diagnosis = standing.told(diagnosis, turns, inputs.expectation.thrust, inputs.vehicle)
         stands = standing.stands(stands, turns)
-    after = GlrMemory(model._replace(belief=belief), windows, flags, judged)
+    after = GlrMemory(model._replace(belief=belief), windows, slow, flags, judged)
     among = verdict.fewest(fresh).map(maximum, flags.flagged)
     held = diagnosis.stuck.thrust
-    return after, diagnosis, GlrSignals(diagnosis.probability, found.excess, among, stands, held, p.threshold)
+    shown = diagnosis.probability, found.excess, among, stands, held, p.threshold, model.gusts.share
+    return after, diagnosis, GlrSignals(*shown)
 
 
 def conclude(

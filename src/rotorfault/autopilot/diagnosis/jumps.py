@@ -37,7 +37,7 @@ from rotorfault.autopilot.diagnosis.fault_free import LOSSES, RATES, Step
 from rotorfault.autopilot.diagnosis.kalman import Belief, Hypothesis, follow_hypothesis
 from rotorfault.maths.geometry import PerRotor
 from rotorfault.maths.records import select_record
-from rotorfault.maths.scalar import Scalar, greater_equal, maximum, select, sqrt
+from rotorfault.maths.scalar import Scalar, absolute, greater_equal, maximum, select, sqrt
 
 SHORTEST = 0.004  # s: between two onsets; about as long as a measured jump of thrust is told from a gust
 DOUBLINGS = 10  # windows, each twice as long as the one before: up to 2.048 s
@@ -117,7 +117,7 @@ class Best(NamedTuple):
     chosen: tuple[PerRotor, ...]  # 1 for the window that says it, for each
 
 
-def best(windows: Windows, least: Scalar) -> Best:
+def best(windows: Windows, least: Scalar, flagged: PerRotor | None = None) -> Best:
     """The window in which the loss of a rotor stands out most.
 
     Parameters
@@ -125,13 +125,15 @@ def best(windows: Windows, least: Scalar) -> Best:
     windows : Windows
     least : scalar
         Loss that is nobody's fault.
+    flagged : PerRotor, optional
+        1 where a loss is believed already, so that a change of it stands out, of any size and sign; 0 if not given.
     """
     rotors = range(len(windows[0].rotors))
     excess: list[Scalar] = []
     losses: list[Scalar] = []
     chosen: list[list[Scalar]] = [[] for _ in windows]
     for i in rotors:
-        shown = [_excess(window.rotors[i], least) for window in windows]
+        shown = [_excess(window.rotors[i], least, 0.0 if flagged is None else flagged[i]) for window in windows]
         most = shown[0][0]
         for size, _ in shown[1:]:
             most = maximum(most, size)
@@ -147,10 +149,10 @@ def best(windows: Windows, least: Scalar) -> Best:
     return Best(PerRotor.of(excess), PerRotor.of(losses), tuple(PerRotor.of(row) for row in chosen))
 
 
-def _excess(hypothesis: Hypothesis, least: Scalar) -> tuple[Scalar, Scalar]:
+def _excess(hypothesis: Hypothesis, least: Scalar, flagged: Scalar) -> tuple[Scalar, Scalar]:
     information = maximum(hypothesis.information, TINY)
     loss = hypothesis.score / information
-    return (loss - least) * sqrt(information), loss
+    return select(flagged, absolute(loss), loss - least) * sqrt(information), loss
 
 
 def believe(belief: Belief, windows: Windows, found: Best, new: PerRotor) -> Belief:

@@ -28,7 +28,7 @@ from typing import NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, following, jumps, verdict
+from rotorfault.autopilot.diagnosis import jumps, verdict
 from rotorfault.autopilot.diagnosis.alarm_rate import HOUR, ratio_threshold
 from rotorfault.autopilot.diagnosis.glr import (
     GlrMemory,
@@ -36,12 +36,13 @@ from rotorfault.autopilot.diagnosis.glr import (
     GlrSettings,
     GlrSignals,
     found_and_followed,
+    nothing_found,
     start,
 )
 from rotorfault.autopilot.diagnosis.kalman import Hypothesis
 from rotorfault.autopilot.diagnosis.protocol import Diagnoser, DiagnosisInputs
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.scalar import Scalar, exp, log, maximum, sqrt
+from rotorfault.maths.scalar import Scalar, exp, log, maximum, select, sqrt
 from rotorfault.model.block import Context, Record
 from rotorfault.model.signals import Diagnosis
 from rotorfault.model.slot import register
@@ -72,14 +73,12 @@ class MultipleModel(Diagnoser[GlrMemory, MultipleModelParameters]):
         """Spreads, windows and level."""
         s = self.settings
         length = jumps.lengths(context.period)
-        level = ratio_threshold(s.false_alarms, context.vehicle.rotors * HOUR / length[0])
-        return MultipleModelParameters(start(s, context, length, level), 1.0 / s.spread**2)
+        level, change = (ratio_threshold(rate, context.vehicle.rotors * HOUR / length[0]) for rate in s.rates)
+        return MultipleModelParameters(start(s, context, length, level, change), 1.0 / s.spread**2)
 
     def initial(self, inputs: DiagnosisInputs, parameters: MultipleModelParameters) -> GlrMemory:
         """Nothing is known yet."""
-        model, rotors = fault_free.at_start(inputs, parameters.common.model), inputs.vehicle.rotors
-        windows = jumps.nothing_seen(len(model.belief.mean), rotors)
-        return GlrMemory(model, windows, verdict.nobody(rotors), following.all_follow(inputs.vehicle))
+        return nothing_found(inputs, parameters.common)
 
     def step(
         self, memory: GlrMemory, inputs: DiagnosisInputs, parameters: MultipleModelParameters, dt: Scalar
@@ -87,13 +86,13 @@ class MultipleModel(Diagnoser[GlrMemory, MultipleModelParameters]):
         """One sampling instant."""
         p = parameters.common
 
-        def evidence(windows: jumps.Windows, found: jumps.Best) -> PerRotor:
-            return log_ratios(windows, p.least, parameters.precision)
+        def evidence(windows: jumps.Windows, found: jumps.Best, flagged: PerRotor) -> PerRotor:
+            return log_ratios(windows, p.least, parameters.precision, flagged)
 
         return found_and_followed(memory, inputs, p, evidence, dt)
 
 
-def log_ratios(windows: jumps.Windows, least: Scalar, precision: Scalar) -> PerRotor:
+def log_ratios(windows: jumps.Windows, least: Scalar, precision: Scalar, flagged: PerRotor | None = None) -> PerRotor:
     """Logarithm of R of each rotor.
 
     Parameters
@@ -103,11 +102,14 @@ def log_ratios(windows: jumps.Windows, least: Scalar, precision: Scalar) -> PerR
         Loss that is nobody's fault.
     precision : scalar
         1 over the variance of losses.
+    flagged : PerRotor, optional
+        1 where a loss is believed already: the ratio is that of a change of it, of either sign; 0 if not given.
     """
     rotors = range(len(windows[0].rotors))
     found: list[Scalar] = []
     for i in rotors:
-        terms = [_log_ratio(window.rotors[i], least, precision) for window in windows]
+        on = 0.0 if flagged is None else flagged[i]
+        terms = [_log_ratio(window.rotors[i], least, precision, on) for window in windows]
         most = terms[0][0]
         for size, _ in terms[1:]:
             most = maximum(most, size)
@@ -119,10 +121,10 @@ def log_ratios(windows: jumps.Windows, least: Scalar, precision: Scalar) -> PerR
     return PerRotor.of(found)
 
 
-def _log_ratio(hypothesis: Hypothesis, least: Scalar, precision: Scalar) -> tuple[Scalar, Scalar]:
+def _log_ratio(hypothesis: Hypothesis, least: Scalar, precision: Scalar, flagged: Scalar) -> tuple[Scalar, Scalar]:
     """Exponent of the likelihood ratio, and the factor before it, squared below."""
     information = hypothesis.information
-    score = maximum(hypothesis.score - least * information, 0.0)
+    score = select(flagged, hypothesis.score, maximum(hypothesis.score - least * information, 0.0))
     whole = information + precision
     return 0.5 * score * score / whole, root_of(precision / whole)
 

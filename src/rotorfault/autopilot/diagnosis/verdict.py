@@ -9,6 +9,11 @@ and from which :math:`\ln\Lambda` on it would be wrong in healthy flight as ofte
 so that one rotor alone has :math:`p_1` where it reaches A, and of two that explain it alike neither does. A rotor is
 flagged once it has had :math:`p_1` or more for ``persistence``, so that no single measurement does it.
 
+A loss that is believed may change at once, too, as one does that comes and goes. For a flagged rotor
+:math:`\Lambda_i` is the ratio of such a change, of either sign, and instead of A stands what is exceeded once a
+second: so much more often does a faulty rotor change than a sound one fails. Such a change stands in the sum with all
+others, so the opposite rotor is not blamed where the faulty one is sound for a while.
+
 A flagged rotor's loss is a state of the filter, :math:`\hat\lambda_i` with the variance :math:`P_i`; its probability
 is that it has lost more than ``least``, :math:`\Phi\big((\hat\lambda_i - least)/\sqrt{P_i}\big)`, with a logistic
 curve for :math:`\Phi` (within 0.01). The flag is taken back where that has stayed below `CLEAR` for
@@ -47,8 +52,8 @@ def nobody(rotors: int) -> VerdictMemory:
     return VerdictMemory(none, none, none)
 
 
-def probabilities(evidence: PerRotor, level: Scalar, flagged: PerRotor) -> PerRotor:
-    """Of a new fault of each rotor.
+def probabilities(evidence: PerRotor, level: Scalar, flagged: PerRotor, change: Scalar | None = None) -> PerRotor:
+    """Of a new fault of each rotor, and of a change where there is one.
 
     Parameters
     ----------
@@ -57,16 +62,21 @@ def probabilities(evidence: PerRotor, level: Scalar, flagged: PerRotor) -> PerRo
     level : scalar
         The same, at which a rotor alone is flagged.
     flagged : PerRotor
-        1 where a fault is believed already, which is none of a new one.
+        1 where a fault is believed already.
+    change : scalar, optional
+        As `level`, for a change of what is believed; it has no probability if not given.
     """
-    known = evidence.map(lambda x, on: select(on, -MOST, x - level), flagged)
+    if change is None:
+        known = evidence.map(lambda x, on: select(on, -MOST, x - level), flagged)
+    else:
+        known = evidence.map(lambda x, on: x - select(on, change, level), flagged)
     # Beside the most that is said for anything: where much is said for two rotors, it is the difference that counts.
     most: Scalar = PRIOR_ODDS
     for x in known:
         most = maximum(most, x)
     shares = known.map(lambda x: exp(maximum(x - most, -MOST)))
     over = 1.0 / (shares.sum() + exp(maximum(PRIOR_ODDS - most, -MOST)))
-    return shares.map(lambda x, on: select(on, 0.0, x * over), flagged)
+    return shares.map(lambda x, on: select(on, 0.0, x * over), flagged) if change is None else shares * over
 
 
 def newly(

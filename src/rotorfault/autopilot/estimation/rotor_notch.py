@@ -29,7 +29,9 @@ who takes them for evidence.
 
 **What is expected** is no vibration: the rotors' believed torque turns the body, their thrust is felt along z. So the
 notches act on what is left of x without that, which passes undelayed; only what is not expected is delayed. The
-torque's integral forgets in `MEMORY`, for an offset of it turns nothing in the end.
+torque's integral k follows what is given within `MEMORY`, :math:`k^+ = k + c\,(y - k)`, so what is left is never more
+than unexpected torques turn in that time, and the whole is :math:`H(z)(z - 1 + c)/(z - 1 + cH(z))`: the notch, which
+at slow signals now comes less late.
 
 Speeds are those of the sensors, where they measure them, brought to now by how the believed ones change; else the
 believed ones. A reading at an end of its range says nothing of vibration and is passed on.
@@ -75,7 +77,7 @@ LEFT = 5.0  # what is off by the error of the speed is left by one over this
 SLOW = (
     1.0  # share of the force in hover below which less is learned, for there noise would be taken for more than it is
 )
-MEMORY = 0.1  # s: of the expected turning; longer than a notch rings, and shorter than offsets last
+MEMORY = 0.025  # s: in which the expected turning follows what is given; a turn or two of a rotor, hence no vibration
 TINY = 1e-12  # rad^2/s^2: a width that is none
 ROUNDING = 1e-9  # share by which a reading at the end of a range may miss it
 
@@ -105,7 +107,7 @@ class NotchMemory(NamedTuple):
     along: tuple[PerRotor, ...]  # a, for rates about x, y, z and specific force along them, in their units
     across: tuple[PerRotor, ...]  # b
     left: PerRotor  # P
-    turned: Vec3  # rad/s: by the believed torque
+    turned: Vec3  # rad/s: by the believed torque, since the rates were about what was given
     rates: Vec3  # rad/s: last given
     force: Vec3  # m/s^2: last given
 
@@ -189,15 +191,15 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
         """Nothing is known of vibration."""
         readings, rotors = inputs.readings, inputs.vehicle.rotors
         none, all_of_it = PerRotor.all(0.0, rotors), PerRotor.all(1.0, rotors)
-        force = readings.specific_force
+        rates, force = required(readings, "rates", "rotor_notch").value, readings.specific_force
         return NotchMemory(
             none,
             all_of_it,
             (none,) * 6,
             (none,) * 6,
             all_of_it,
-            zeros(),
-            required(readings, "rates", "rotor_notch").value,
+            rates,
+            rates,
             force.value if isinstance(force, Reading) else zeros(),
         )
 
@@ -226,13 +228,14 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
         power = squared.dot(squared * left) * share
 
         turned = _turned_by_rotors(memory.turned, inputs, dt)
-        rates, along, across = _through(gyro, turned, memory, 0, memory.rates, p.gyro_end, now)
+        rates, turned, rest, along, across = _through(gyro, turned, memory, 0, memory.rates, p.gyro_end, now)
+        turned = turned + rest * (dt / (MEMORY + dt))
         gyro = gyro._replace(value=rates, shaken=p.gyro_shaken * power)
         given, force = inputs.readings._replace(rates=gyro), inputs.readings.specific_force
         felt = memory.force
         if isinstance(force, Reading):
             lift = _lift(inputs)
-            felt, more_along, more_across = _through(force, lift, memory, 3, felt, p.force_end, now)
+            felt, _, _, more_along, more_across = _through(force, lift, memory, 3, felt, p.force_end, now)
             along, across = along + more_along, across + more_across
             given = given._replace(specific_force=force._replace(value=felt, shaken=p.force_shaken * power))
         else:
@@ -287,10 +290,10 @@ def _left(one: tuple[Scalar, ...], dt: Scalar) -> Scalar:
 
 
 def _turned_by_rotors(before: Vec3, inputs: FilterInputs, dt: Scalar) -> Vec3:
-    """Rates in rad/s that the believed rotors have lately given."""
+    """Rates in rad/s to which the believed rotors have brought the body."""
     vehicle = inputs.vehicle
     turn = over_inertia(vehicle, wrench_of(vehicle, inputs.rotors.mean).torque_B)
-    after: Vec3 = before * (1.0 - dt / (MEMORY + dt)) + turn * dt
+    after: Vec3 = before + turn * dt
     return after
 
 
@@ -302,19 +305,24 @@ def _lift(inputs: FilterInputs) -> Vec3:
 
 def _through(
     reading: Reading[Vec3], expected: Vec3, memory: NotchMemory, first: int, held: Vec3, end: Scalar, now: _Step
-) -> tuple[Vec3, tuple[PerRotor, ...], tuple[PerRotor, ...]]:
-    """Three channels less what vibrates in them, and what is learned of that.
+) -> tuple[Vec3, Vec3, Vec3, tuple[PerRotor, ...], tuple[PerRotor, ...]]:
+    """Three channels less what vibrates in them, what is and is not expected of that, and what vibrates.
 
     What is not new is what it was; what is at the end of the range passes, and nothing is learned of it.
     """
     fresh, most = greater(reading.valid, 0.5), end * (1.0 - 2.0 * ROUNDING)
-    given, along, across = [], [], []
+    given, expecting, new, along, across = [], [], [], [], []
     for k, (x, known, old) in enumerate(zip(reading.value, expected, held, strict=True), first):
         a, b = memory.along[k], memory.across[k]
-        within = less(absolute(x), end * (1.0 - ROUNDING))
-        rest = (x - known - a.dot(now.shown[0]) - b.dot(now.shown[1])) * now.over
+        within, was = (less(absolute(one), end * (1.0 - ROUNDING)) for one in (x, old))
+        calm = x - a.dot(now.shown[0]) - b.dot(now.shown[1])
+        # After the end of the range it is what it is: nothing is expected of it.
+        begun = select(was, known, calm)
+        rest = (calm - begun) * now.over
         told = select(both(fresh, within), rest, 0.0)
         along.append(a + now.learned[0] * told)
         across.append(b + now.learned[1] * told)
-        given.append(select(fresh, select(within, clip(rest + known, -most, most), x), old))
-    return Vec3.of(given), tuple(along), tuple(across)
+        given.append(select(fresh, select(within, clip(rest + begun, -most, most), x), old))
+        expecting.append(begun)
+        new.append(told)
+    return Vec3.of(given), Vec3.of(expecting), Vec3.of(new), tuple(along), tuple(across)
