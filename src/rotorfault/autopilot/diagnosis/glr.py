@@ -18,7 +18,16 @@ from typing import Annotated, NamedTuple, final
 
 from pydantic import Field
 
-from rotorfault.autopilot.diagnosis import fault_free, following, jumps, slow_losses, standing, turning_gusts, verdict
+from rotorfault.autopilot.diagnosis import (
+    fault_free,
+    following,
+    jumps,
+    slow_losses,
+    standing,
+    touch,
+    turning_gusts,
+    verdict,
+)
 from rotorfault.autopilot.diagnosis.alarm_rate import HOUR, windows_threshold
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelMemory, ModelParameters
 from rotorfault.autopilot.diagnosis.following import FollowingMemory, FollowingParameters
@@ -195,6 +204,7 @@ def found_and_followed(
     looked = windows + slow_losses.windows(slow, model.belief, p.model, inputs.vehicle)
     found = jumps.best(looked, p.least, flagged)
     fresh = verdict.probabilities(evidence(looked, found, flagged), p.threshold, flagged, p.change)
+    fresh = fresh * touch.rather_lost(found.loss, found.felt)
     turns = model.standing if isinstance(model.standing, standing.Standing) else None
     if turns is not None:
         fresh = fresh * (1.0 - turns.doubt)

@@ -115,6 +115,7 @@ class Best(NamedTuple):
     excess: PerRotor  # standard deviations by which its loss stands out
     loss: PerRotor  # as estimated
     chosen: tuple[PerRotor, ...]  # 1 for the window that says it, for each
+    felt: PerRotor  # the part of its score that the specific force along body z has
 
 
 def best(windows: Windows, least: Scalar, flagged: PerRotor | None = None) -> Best:
@@ -132,6 +133,7 @@ def best(windows: Windows, least: Scalar, flagged: PerRotor | None = None) -> Be
     excess: list[Scalar] = []
     losses: list[Scalar] = []
     chosen: list[list[Scalar]] = [[] for _ in windows]
+    felt: list[Scalar] = []
     for i in rotors:
         shown = [_excess(window.rotors[i], least, 0.0 if flagged is None else flagged[i]) for window in windows]
         most = shown[0][0]
@@ -139,14 +141,18 @@ def best(windows: Windows, least: Scalar, flagged: PerRotor | None = None) -> Be
             most = maximum(most, size)
         taken: Scalar = 0.0
         loss: Scalar = 0.0
+        of_force: Scalar = 0.0
         for k, (size, estimate) in enumerate(shown):
             here = select(greater_equal(size, most), 1.0 - taken, 0.0)
             taken = taken + here
             loss = loss + here * estimate
+            of_force = of_force + here * windows[k].rotors[i].last
             chosen[k].append(here)
         excess.append(most)
         losses.append(loss)
-    return Best(PerRotor.of(excess), PerRotor.of(losses), tuple(PerRotor.of(row) for row in chosen))
+        felt.append(of_force)
+    by_window = tuple(PerRotor.of(row) for row in chosen)
+    return Best(PerRotor.of(excess), PerRotor.of(losses), by_window, PerRotor.of(felt))
 
 
 def _excess(hypothesis: Hypothesis, least: Scalar, flagged: Scalar) -> tuple[Scalar, Scalar]:
@@ -201,6 +207,6 @@ def begun_anew(windows: Windows, kept: Scalar) -> Windows:
     """
 
     def one(h: Hypothesis) -> Hypothesis:
-        return Hypothesis(tuple(x * kept for x in h.error), h.score * kept, h.information * kept)
+        return Hypothesis(tuple(x * kept for x in h.error), h.score * kept, h.information * kept, h.last * kept)
 
     return tuple(Window(window.age * kept, tuple(map(one, window.rotors))) for window in windows)

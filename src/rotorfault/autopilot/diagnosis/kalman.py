@@ -146,6 +146,7 @@ class Hypothesis(NamedTuple):
     error: tuple[Scalar, ...]  # of the filter's state
     score: Scalar  # d, the sum of g nu / S
     information: Scalar  # C, the sum of g^2 / S
+    last: Scalar = 0.0  # the part of d that the last of the measured numbers has
 
 
 def follow_hypothesis(
@@ -173,7 +174,7 @@ def follow_hypothesis(
     for i, row in rows.items():
         moved = error[i] + dot(row, hypothesis.error)
         error[i] = moved + added[i] if i in added else moved
-    score, information = hypothesis.score, hypothesis.information
+    score, information, of_last = hypothesis.score, hypothesis.information, hypothesis.last
     *_, last = seen
     for pair in seen:
         row, one = pair
@@ -181,10 +182,12 @@ def follow_hypothesis(
         if pair is last:
             shown = shown + felt
         over = shown / one.variance
+        if pair is last:
+            of_last = of_last + over * one.value
         score = score + over * one.value
         information = information + over * shown
         error = [x - gain * shown for x, gain in zip(error, one.gain, strict=True)]
-    return Hypothesis(tuple(error), score, information)
+    return Hypothesis(tuple(error), score, information, of_last)
 
 
 def learned_elsewhere(belief: Belief, place: int, change: Scalar, left: Scalar, start: Scalar) -> Belief:

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rotorfault.autopilot.diagnosis import touch
 from rotorfault.autopilot.diagnosis.fault_free import LOSSES, MASS, OFFSETS, ModelParameters
 from rotorfault.autopilot.diagnosis.jumps import Window, Windows
 from rotorfault.autopilot.diagnosis.kalman import Belief, Hypothesis
@@ -144,7 +145,7 @@ def windows(slow: Slow, belief: Belief, parameters: ModelParameters, vehicle: Ve
             for i, size in zip(PLACES, move, strict=True):
                 error[i] = -size
             score, information = (sum(a * b for a, b in zip(scaled, other, strict=True)) for other in (y, v))
-            rotors.append(Hypothesis(tuple(error), score, information))
+            rotors.append(Hypothesis(tuple(error), score, information, touch.NO_TOUCH))
         found.append(Window(0.0, tuple(rotors)))
     return tuple(found)
 
