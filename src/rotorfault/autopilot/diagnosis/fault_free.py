@@ -165,7 +165,7 @@ def model_parameters(settings: ModelSettings, context: Context) -> ModelParamete
         along=along,
         inertia=s.inertia,
         lag=1.0 / w,
-        first=sensed.variance_at_start(context, "rates", s.gyroscope),
+        first=sensed.variance(context, "rates", s.gyroscope, first=True),
         gyroscope=sensed.variance(context, "rates", s.gyroscope),
         accelerometer=sensed.variance(context, "specific_force", s.accelerometer),
         end=sensed.end_of_range(context),

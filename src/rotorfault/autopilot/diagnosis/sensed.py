@@ -30,7 +30,7 @@ OUTLIER = 9.0  # expected squares that one innovation may count for: three stand
 ROUNDING = 1e-9  # share by which a reading at the end of a range may miss it
 
 
-def variance(context: Context, sensor: str, least: float) -> float:
+def variance(context: Context, sensor: str, least: float, *, first: bool = False) -> float:
     """Variance of a number as the sensors' record has it, vibration and all, or of a least noise.
 
     Parameters
@@ -41,29 +41,14 @@ def variance(context: Context, sensor: str, least: float) -> float:
         Field of `rotorfault.model.sensor_model.SensorModel`.
     least : float
         Standard deviation, in the sensor's unit.
+    first : bool
+        Of the sensor's first number, of which no filter has taken vibration yet.
     """
     noise = getattr(context.sensors, sensor, ())
     if not isinstance(noise, SensorNoise):
         return least**2
-    return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration) ** 2, least**2)
-
-
-def variance_at_start(context: Context, sensor: str, least: float) -> float:
-    """Variance of a sensor's first number, of which no filter has taken vibration yet, or of a least noise.
-
-    Parameters
-    ----------
-    context : Context
-        With the sensors as believed.
-    sensor : str
-        Field of `rotorfault.model.sensor_model.SensorModel`.
-    least : float
-        Standard deviation, in the sensor's unit.
-    """
-    noise = getattr(context.sensors, sensor, ())
-    if not isinstance(noise, SensorNoise):
-        return least**2
-    return max(float(noise.std) ** 2 + 0.5 * float(noise.vibration + noise.filtered) ** 2, least**2)
+    vibration = float(noise.vibration + noise.filtered) if first else float(noise.vibration)
+    return max(float(noise.std) ** 2 + 0.5 * vibration**2, least**2)
 
 
 def end_of_range(context: Context) -> Scalar | tuple[()]:

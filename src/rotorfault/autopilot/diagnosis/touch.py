@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rotorfault.autopilot.diagnosis.verdict import RAISE
+from rotorfault.autopilot.diagnosis.verdict import MOST, RAISE
 from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, clip, exp, maximum, sqrt
 from rotorfault.model.block import Context
@@ -35,7 +35,6 @@ CLEARLY = 3.0  # standard deviations from which on a push is no noise
 PUSH = 0.01  # s: over which a push is averaged; less than a touch of the ground lasts
 ODDS = 0.5 * (1.0 - RAISE)  # of a touch against a loss, where nothing is felt of either
 NO_TOUCH = 1e3  # score by the specific force of what is no touch: that one of seconds is felt
-MOST = 60.0  # of an exponent: beyond it a probability is 1 but for rounding
 BOUNCE = 0.2  # s: after which a body that has touched the ground has come to rest or gone
 
 
