@@ -88,5 +88,6 @@ def test_rows_of_a_campaign_depend_on_nothing_that_is_left_out() -> None:
         "campaigns/check.py", "campaigns/replay.py", "campaigns/run.py",
         "campaigns/summaries/__init__.py", "campaigns/summaries/detection.py",
         "campaigns/summaries/detection_figures.py", "campaigns/summaries/isolation.py",
-        "campaigns/summaries/parts.py", "campaigns/summaries/total_loss.py",
+        "campaigns/summaries/paired.py", "campaigns/summaries/parts.py",
+        "campaigns/summaries/total_loss.py",
     }  # fmt: skip

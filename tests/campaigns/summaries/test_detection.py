@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 from gates import needs_simd
 from scipy.optimize import brentq
-from scipy.stats import poisson
+from scipy.stats import binom, poisson
 from summary_studies import DETECTION
 
 import rotorfault
@@ -210,6 +210,43 @@ def test_each_detector_is_drawn_by_how_soon_it_names_the_right_rotor(flown: Path
 
 
 @needs_simd
+def test_two_detectors_are_compared_on_the_same_flights(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet").with_columns(
+        right=pl.col("grade").is_in(["right rotor", "others too", "quiet"])
+        | ((pl.col("loss") == 0.0) & (pl.col("false_alarms") == 0))
+    )
+    first, second = (table.filter(pl.col("variant") == one) for one in ("as it is", "eager"))
+    both = first.join(second, on=["cell", "number"], suffix="_other")
+    assert (both["seed"] == both["seed_other"]).all()
+    rows = content_of(flown)["paired"]
+    assert [(row["first"], row["second"]) for row in rows] == [("as it is", "eager")] * 3
+    unlike = 0
+    for row in rows:
+        loss = 0.0 if row["fault"] == "healthy" else float(row["fault"])
+        mine = both.filter(pl.col("loss") == loss)
+        one, other = mine["right"], mine["right_other"]
+        assert row["flights"] == mine.height
+        counts = ((one & other).sum(), (one & ~other).sum(), (~one & other).sum(), (~one & ~other).sum())
+        assert counts == tuple(row[name] for name in ("both", "first_only", "second_only", "neither"))
+        least, most = sorted((row["first_only"], row["second_only"]))
+        unlike += least + most
+        assert row["p"] == pytest.approx(min(1.0, 2.0 * binom.cdf(least, least + most, 0.5)))
+    assert unlike > 0
+
+
+@needs_simd
+def test_with_and_without_speeds_are_two_lines_of_the_roc(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet").to_arrow()
+    off = {"diagnosis": {"kind": "glr"}, "sensors": {"kind": "mocap"}}
+    variants = [
+        {"label": "as it is", "settings": off},
+        {"label": "eager", "settings": off | {"sensors": {"kind": "mocap", "rotor_speeds": {"on": True}}}},
+    ]
+    content = detection(study_from(DETECTION | {"variant": variants}, "study"), table).files["detection.json"]
+    assert {row["variant"]: row["rotor_speeds"] for row in content["roc"]} == {"as it is": False, "eager": True}
+
+
+@needs_simd
 def test_isolation_of_a_detector_that_is_foreseen_is_its_own(flown: Path) -> None:
     """The same table read as if `glr` had flown: predicted shares follow its windows, what was measured stays."""
     table = pl.read_parquet(flown / "flights.parquet").to_arrow()
@@ -252,10 +289,27 @@ def test_all_vehicles_meet_all_manoeuvres_with_real_sensors(name: str) -> None:
     assert len(sets) == 6
 
 
+@pytest.mark.parametrize("name", ["detection", "detection-rate", "detection-speeds", "detection-frames"])
+def test_the_air_turns_every_vehicle(name: str) -> None:
+    """Gusts that differ over it, drag beside its centre of mass, and a moment as of drag above its rotors."""
+    study = load_study(name)
+    first = {axis.name: axis.case[0] for axis in study.case_axes}
+    for vehicle in next(axis.case for axis in study.case_axes if axis.name == "vehicle"):
+        scenario = study.scenario_of(0, tuple({**first, "vehicle": vehicle}.values()))
+        assert scenario.wind.settings.gradients
+        drag = scenario.vehicle.air.number("rotor_drag")
+        drawn = next(draw for draw in vehicle.draw if draw.name == "vehicle.air.flapping.value")
+        lever = 0.01 if scenario.vehicle.name == "crazyflie-2.1" else 0.03
+        assert drawn.uniform == pytest.approx((0.0, lever * drag), rel=0.01)
+
+
 def test_each_detector_flies_with_speeds_and_without() -> None:
     study = load_study("detection-speeds")
     first = tuple(axis.case[0] for axis in study.case_axes)
     flown = [study.scenario_of(variant, first) for variant in range(len(study.variant))]
-    kinds = [(one.diagnosis.kind, one.sensors.settings.rotor_speeds.on) for one in flown]
-    assert sorted(kinds) == sorted((kind, on) for kind in {one[0] for one in kinds} for on in (False, True))
-    assert len(kinds) == 8
+    told = [(str(one.diagnosis.settings), one.sensors.settings.rotor_speeds.on) for one in flown]
+    assert sorted(told) == sorted((kind, on) for kind in {one[0] for one in told} for on in (False, True))
+    # Two thresholds of each of the four: a line of the ROC is more than a point.
+    kinds = [one.diagnosis.kind for one in flown]
+    assert len(set(kinds)) == 4
+    assert {kinds.count(kind) for kind in kinds} == {4}

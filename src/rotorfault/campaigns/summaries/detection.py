@@ -2,8 +2,8 @@
 
 ``detection.json`` has the false alarms of healthy flights, and for each vehicle, set of sensors, detector and fault
 how many flights named the right rotor, how many none, and after what time; besides, each of these by manoeuvre, by
-strength of gusts and of vibration, which rotor was named for which, the error of the loss, points of the ROC, and
-the rate of false alarms that was asked for beside the one that was had.
+strength of gusts and of vibration, which rotor was named for which, the error of the loss, points of the ROC, the
+rate of false alarms that was asked for beside the one that was had, and each two detectors on the same flights.
 
 A rate per hour has Garwood's interval: that of a Poisson count, exact.
 """
@@ -21,6 +21,7 @@ from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.campaigns.study import Study
 from rotorfault.campaigns.summaries.detection_figures import figures, tables
 from rotorfault.campaigns.summaries.isolation import isolation
+from rotorfault.campaigns.summaries.paired import paired
 from rotorfault.campaigns.summaries.parts import (
     NAMED,
     Column,
@@ -35,6 +36,7 @@ from rotorfault.campaigns.summaries.parts import (
     milliseconds,
     percent,
     sensors_of,
+    speeds_of,
     told,
 )
 from rotorfault.scenario.scenario import Scenario
@@ -73,12 +75,16 @@ def detection(study: Study, table: pa.Table) -> Summary:
         "losses_by_gusts": _by_bands(flights, by_loss, "gust_intensity", "gusts"),
         "losses_by_vibration": _by_bands(flights, by_loss, "vibration", "vibration"),
         "wanted": _wanted(flights),
+        "paired": paired(flights),
         "confusion": _confusion(flights),
         "isolation": isolation(flights, first),
         "roc": _roc(flights),
     }
     return Summary(
-        {"detection.json": content}, tuple(_lines(content)), tables(content), figures(flights, of_first, content)
+        {"detection.json": content},
+        tuple(_lines(content)),
+        tables(flights, content),
+        figures(flights, of_first, content),
     )
 
 
@@ -106,7 +112,7 @@ def _flights(study: Study, columns: Mapping[str, Column]) -> Flights:
         kind = Kind(
             one.vehicle, sensors_of(one), one.kind("detector", DIAGNOSIS), study.variant[one.variant].label,
             one.labels.get("fault", ""), one.labels.get("manoeuvre", "as given"), len(one.scenario.vehicle.rotor),
-            getattr(one.scenario[DIAGNOSIS].settings, "false_alarms", None),
+            getattr(one.scenario[DIAGNOSIS].settings, "false_alarms", None), speeds_of(one),
         )  # fmt: skip
         for k in one.which:
             kinds[k] = kind
@@ -226,16 +232,16 @@ def _confusion(flights: Flights) -> list[Row]:
 def _roc(flights: Flights) -> list[Row]:
     """A point for each variant and fault: false alarms per hour, and share of faults whose rotor was named."""
     found = []
-    for (detector, variant), which in flights.some("detector", "variant").items():
+    for (detector, variant, speeds), which in flights.some("detector", "variant", "speeds").items():
         healthy = which[flights.loss[which] == 0.0]
         alarms = _alarms(flights, healthy)
         faulty = which[flights.loss[which] > 0.0]
         for (fault,), part in grouped([(flights.kind[k].fault,) for k in faulty]).items():
             numbers = _losses(flights, faulty[part])
             found.append(
-                {"detector": detector, "variant": variant, "fault": fault, "per_hour": alarms["per_hour"],
-                 "right": numbers["right_rotor"] / numbers["flights"], "low": numbers["right_low"],
-                 "high": numbers["right_high"]}
+                {"detector": detector, "variant": variant, "rotor_speeds": speeds, "fault": fault,
+                 "per_hour": alarms["per_hour"], "right": numbers["right_rotor"] / numbers["flights"],
+                 "low": numbers["right_low"], "high": numbers["right_high"]}
             )  # fmt: skip
     return found
 

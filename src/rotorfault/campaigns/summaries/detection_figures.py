@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
+from rotorfault.campaigns.summaries.paired import paired_table
 from rotorfault.campaigns.summaries.parts import (
     NAMED,
     Column,
@@ -27,17 +29,20 @@ NO_ROTOR = "none"
 AFTER = 0.1  # s: a rotor that is named by then has a loss that is estimated when it is read
 
 
-def tables(content: Row) -> tuple[PageTable, ...]:
+def tables(flights: Flights, content: Row) -> tuple[PageTable, ...]:
     """Tables of the page.
 
     Parameters
     ----------
+    flights : Flights
     content : dict
         Of ``detection.json``.
     """
     wanted = (_wanted_table(content["wanted"]),) if len(content["wanted"]) > 1 else ()
     apart = (_isolation_table(content["isolation"]),) if content["isolation"] else ()
-    return (_loss_table(content["losses"]), _alarm_table(content["false_alarms_by"]), *wanted, *apart)
+    pairs = _pairs(flights)
+    beside = (paired_table(content["paired"], pairs),) if pairs else ()
+    return (_loss_table(content["losses"]), _alarm_table(content["false_alarms_by"]), *beside, *wanted, *apart)
 
 
 def figures(flights: Flights, of_first: Column, content: Row) -> tuple[Shares | Curves | Rates, ...]:
@@ -61,6 +66,19 @@ def figures(flights: Flights, of_first: Column, content: Row) -> tuple[Shares | 
         *_rates(content),
         *_roc(content["roc"]),
     )
+
+
+def _pairs(flights: Flights) -> set[tuple[str, str]]:
+    """Variants that are shown beside each other: the first and each other, and with rotor speeds and without."""
+    said = {one.variant: one for one in flights.kind}
+    names = list(said)
+    with_first = {(names[0], other) for other in names[1:]}
+    alike = {name: (said[name].detector, said[name].wanted) for name in names}
+    return with_first | {
+        (one, other)
+        for one, other in combinations(names, 2)
+        if alike[one] == alike[other] and said[one].speeds != said[other].speeds
+    }
 
 
 def _loss_table(rows: list[Row]) -> PageTable:
@@ -252,7 +270,8 @@ def _rates(content: Row) -> list[Rates]:
 def _roc(roc: list[Row]) -> list[Curves]:
     """Share of right rotors over false alarms, a line for each detector and fault through its thresholds."""
     lines = {}
-    for (detector, fault), which in grouped([(row["detector"], row["fault"]) for row in roc]).items():
+    told = [(row["detector"] + (", speeds" if row["rotor_speeds"] else ""), row["fault"]) for row in roc]
+    for (detector, fault), which in grouped(told).items():
         rows = [roc[k] for k in which if roc[k]["per_hour"] is not None]
         if len(rows) > 1:
             points = np.array([[row[name] for name in ("per_hour", "right", "low", "high")] for row in rows])

@@ -82,6 +82,7 @@ class Kind(NamedTuple):
     manoeuvre: str
     rotors: int
     wanted: float | None  # false alarms per hour, where a detector is asked for them
+    speeds: bool  # whether rotor speeds are measured
 
 
 class Flights(NamedTuple):
@@ -228,6 +229,11 @@ def controller_of(study: Study, one: Told) -> str:
 def sensors_of(one: Told) -> str:
     """The set of sensors."""
     return one.kind("sensors", SENSORS)
+
+
+def speeds_of(one: Told) -> bool:
+    """Whether rotor speeds are measured."""
+    return bool(getattr(getattr(one.scenario[SENSORS].settings, "rotor_speeds", None), "on", False))
 
 
 def diagnosis_of(one: Told) -> str:
