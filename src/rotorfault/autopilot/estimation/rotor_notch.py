@@ -21,20 +21,21 @@ slow signals come later by :math:`B/\Omega^2` (of an alias, by its own frequency
 alike, are as wide as leaves a `LEFT`-th of what is off by that, or as comes no later than ``delay``: they fade where
 a rotor, or its alias, is slow. What is left then is what is believed of the sensors behind it (`RotorNotch.left`).
 
-While speeds change they are also wrong by ``lag_error`` of what they change by in the time of the lag (or in the age
-of what is measured), :math:`\Delta = \epsilon\tau|\dot\Omega|`, and rotors are apart, so each has its own notch, of a
-share of the width. What is left of the square is P, 1 at the start, :math:`\dot P = B(P_\infty - P)`, with the square
-of the share above for :math:`P_\infty`. It goes with the readings (`rotorfault.model.signals.Reading.shaken`), for
-who takes them for evidence.
+While speeds change they are also wrong, for the lag may be wrong by ``lag_error`` (or change between a measurement
+and now as fast as that). How much vibration is left then is followed as the angles slip
+(`rotorfault.autopilot.estimation.phase_slip`), from all of it at the start on. It goes with the readings
+(`rotorfault.model.signals.Reading.shaken`), for who takes them for evidence.
 
-**What is expected** is no vibration: the rotors' believed torque turns the body, their thrust is felt along z. So the
-notches act on what is left of x without that, which passes undelayed; only what is not expected is delayed. The
-torque's integral k follows what is given within `MEMORY`, :math:`k^+ = k + c\,(y - k)`, so what is left is never more
-than unexpected torques turn in that time, and the whole is :math:`H(z)(z - 1 + c)/(z - 1 + cH(z))`: the notch, which
-at slow signals now comes less late.
+**What is expected** is no vibration: the rotors' believed torque turns the body, so does their reaction when they
+change their speed, at once, and the body's own spin; their thrust is felt along z. So the notches act on what is left
+of x without that, which passes undelayed; only what is not expected is delayed. The torque's integral k follows what
+is given within `MEMORY`, :math:`k^+ = k + c\,(y - k)`, so what is left is never more than unexpected torques turn in
+that time, and the whole is :math:`H(z)(z - 1 + c)/(z - 1 + cH(z))`: the notch, which at slow signals now comes less
+late.
 
-Speeds are those of the sensors, where they measure them, brought to now by how the believed ones change; else the
-believed ones. A reading at an end of its range says nothing of vibration and is passed on.
+Speeds are those of the sensors, where they measure them, brought to now by how the believed ones change; else, or
+where no reading has come when one was due, the believed ones. A reading at an end of its range says nothing of
+vibration and is passed on.
 
 Sources: J. R. Glover, "Adaptive noise canceling applied to sinusoidal interferences", IEEE Trans. ASSP 25, 1977,
 whose canceller is a notch; the practice of Betaflight's RPM filter and PX4's dynamic notches, which follow rotors.
@@ -48,6 +49,7 @@ from typing import NamedTuple, final
 from pydantic import Field
 
 from rotorfault.autopilot.estimation.imu_filter import FilterInputs, ImuFilter
+from rotorfault.autopilot.estimation.phase_slip import Slip, begun, slipped
 from rotorfault.autopilot.estimation.protocol import required
 from rotorfault.autopilot.rotor_model import expected_thrust
 from rotorfault.base.config import Strict
@@ -67,18 +69,17 @@ from rotorfault.maths.scalar import (
 )
 from rotorfault.model.block import Context, Nothing, Record
 from rotorfault.model.mixer import hover_thrust
-from rotorfault.model.motion import mean_bandwidth
+from rotorfault.model.motion import mean_bandwidth, torque_of_motion
 from rotorfault.model.sensor_model import SensorModel, SensorNoise, Timing
 from rotorfault.model.signals import Reading, Readings
 from rotorfault.model.slot import register
-from rotorfault.model.vehicle import over_inertia, rotor_speeds, wrench_of
+from rotorfault.model.vehicle import over_inertia, residual_speed, rotor_speeds, turn_against_rotors, wrench_of
 
 LEFT = 5.0  # what is off by the error of the speed is left by one over this
 SLOW = (
     1.0  # share of the force in hover below which less is learned, for there noise would be taken for more than it is
 )
 MEMORY = 0.025  # s: in which the expected turning follows what is given; a turn or two of a rotor, hence no vibration
-TINY = 1e-12  # rad^2/s^2: a width that is none
 ROUNDING = 1e-9  # share by which a reading at the end of a range may miss it
 
 
@@ -87,10 +88,12 @@ class NotchParameters(NamedTuple):
 
     on: Scalar  # 1 where the sensors' record has vibration, else 0
     error: Scalar  # rad/s: of a constant speed
-    lag: Scalar  # s: by which the time of a speed may be wrong, of one that is believed
-    lag_error: Scalar  # share, of one that is measured
+    believed: Scalar  # rad/s: of one that is believed
+    lag: Scalar  # s: of the rotors
+    lag_error: Scalar  # share by which it may be wrong
     delay: Scalar  # s: most that all notches delay slow signals
-    over_hover: PerRotor  # s^2: one over the squared speed in hover
+    hover: PerRotor  # rad/s: speed in hover
+    over_hover: PerRotor  # s^2: one over its square, 0 of a rotor that stands
     gyro_end: Scalar  # rad/s: of the range
     force_end: Scalar  # m/s^2: of the range
     gyro_shaken: Scalar  # rad^2/s^2: variance of vibration at hover
@@ -106,7 +109,8 @@ class NotchMemory(NamedTuple):
     cosine: PerRotor
     along: tuple[PerRotor, ...]  # a, for rates about x, y, z and specific force along them, in their units
     across: tuple[PerRotor, ...]  # b
-    left: PerRotor  # P
+    slip: Slip  # of the rotors' angles beside these
+    silent: Scalar  # s: since the last valid reading of the speeds
     turned: Vec3  # rad/s: by the believed torque, since the rates were about what was given
     rates: Vec3  # rad/s: last given
     force: Vec3  # m/s^2: last given
@@ -146,9 +150,11 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
         return NotchParameters(
             1.0 if any(shaken) else 0.0,
             self._error(sensors, hover),
-            s.lag_error / float(mean_bandwidth(context.vehicle)),
+            self._error(SensorModel(), hover),
+            1.0 / float(mean_bandwidth(context.vehicle)),
             s.lag_error,
             s.delay,
+            PerRotor.of(map(abs, hover)),
             PerRotor.of(1.0 / speed**2 if speed else 0.0 for speed in hover),
             _end(sensors.rates),
             _end(sensors.specific_force),
@@ -197,7 +203,8 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
             all_of_it,
             (none,) * 6,
             (none,) * 6,
-            all_of_it,
+            begun(rotors),
+            0.0,
             rates,
             rates,
             force.value if isinstance(force, Reading) else zeros(),
@@ -208,14 +215,14 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
     ) -> tuple[NotchMemory, Readings, Record]:
         """One sampling instant."""
         p, gyro = parameters, required(inputs.readings, "rates", "rotor_notch")
-        speed, late = _speed(inputs, p, dt)
+        speed, behind, error, silent = _speed(memory, inputs, p, dt)
         spell = max(p.timing.every, 1) * dt
         sine, cosine = _turned(memory, speed, dt)
         squared = speed * speed * p.over_hover
         floor = squared.map(lambda x: maximum(x, SLOW))
         share = 1.0 / len(squared)
         # All notches together are as wide as this; each has its share.
-        wanted = 2.0 * LEFT * p.error * p.on
+        wanted = 2.0 * LEFT * error * p.on
         width = speed.map(lambda x: minimum(wanted, p.delay * _slow(x, spell)))
         own = width * share
         gain = own * spell * squared / (floor * floor)
@@ -224,10 +231,11 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
             (sine * gain, cosine * gain),
             1.0 / (1.0 + 0.5 * gain.dot(squared)),
         )
-        left = memory.left.map(lambda *one: _left(one, dt), own, late)
-        power = squared.dot(squared * left) * share
+        # What each learns of its own in a period: half of what is left goes with the sine, half with the cosine.
+        taught = gain * squared * (0.5 * dt / spell)
+        slip, power = slipped(memory.slip, squared, behind, p.hover, taught, p.lag_error, dt)
 
-        turned = _turned_by_rotors(memory.turned, inputs, dt)
+        turned = _turned_by_rotors(memory, inputs, dt)
         rates, turned, rest, along, across = _through(gyro, turned, memory, 0, memory.rates, p.gyro_end, now)
         turned = turned + rest * (dt / (MEMORY + dt))
         gyro = gyro._replace(value=rates, shaken=p.gyro_shaken * power)
@@ -240,7 +248,7 @@ class RotorNotch(ImuFilter[NotchMemory, NotchParameters]):
             given = given._replace(specific_force=force._replace(value=felt, shaken=p.force_shaken * power))
         else:
             along, across = along + memory.along[3:], across + memory.across[3:]
-        return NotchMemory(sine, cosine, along, across, left, turned, rates, felt), given, Nothing()
+        return NotchMemory(sine, cosine, along, across, slip, silent, turned, rates, felt), given, Nothing()
 
 
 def _known(context: Context) -> SensorModel:
@@ -255,16 +263,22 @@ def _timing(noise: SensorNoise | tuple[()]) -> Timing:
     return noise.timing if isinstance(noise, SensorNoise) else Timing()
 
 
-def _speed(inputs: FilterInputs, p: NotchParameters, dt: Scalar) -> tuple[PerRotor, PerRotor]:
-    """Speeds in rad/s now, and by what they may be wrong for they come late or early."""
-    rate = inputs.sped / dt
+def _speed(
+    memory: NotchMemory, inputs: FilterInputs, p: NotchParameters, dt: Scalar
+) -> tuple[PerRotor, PerRotor, Scalar, Scalar]:
+    """Speeds in rad/s, by what their squares over hover lag (`Slip`), their error, time without a reading."""
+    changed = inputs.sped * (2.0 * inputs.speed - inputs.sped) * p.over_hover
+    behind = (memory.slip.behind - changed) * (1.0 / (1.0 + dt / p.lag))
     measured = inputs.readings.rotor_speeds
     if not isinstance(measured, Reading):
-        return inputs.speed, rate * p.lag
-    age = measured.age
-    there = less(age, (p.speed_timing.every + p.speed_timing.late + 0.5) * dt)  # else nothing comes any more
+        return inputs.speed, behind, p.error, 0.0
+    # A reading that drops out keeps its value, and its age says nothing.
+    silent = select(greater(measured.valid, 0.5), 0.0, memory.silent + dt)
+    there, age = less(silent, (p.speed_timing.every - 0.5) * dt), measured.age
+    rate = inputs.sped / dt
     speed = measured.value.map(lambda seen, believed, x: select(there, seen + x * age, believed), inputs.speed, rate)
-    return speed, rate * select(there, p.lag_error * age, p.lag)
+    behind = behind.map(lambda b, c: select(there, -c * age / dt, b), changed)
+    return speed, behind, select(there, p.error, p.believed), silent
 
 
 def _turned(memory: NotchMemory, speed: PerRotor, dt: Scalar) -> tuple[PerRotor, PerRotor]:
@@ -281,20 +295,15 @@ def _slow(speed: Scalar, spell: Scalar) -> Scalar:
     return (2.0 - 2.0 * cos(speed * spell)) / (spell * spell)
 
 
-def _left(one: tuple[Scalar, ...], dt: Scalar) -> Scalar:
-    """Share of the squared vibration of a rotor that is left a period later."""
-    before, width, error = one
-    off = 4.0 * error * error
-    passed = width * dt
-    return (before + passed * off / (width * width + off + TINY)) / (1.0 + passed)
-
-
-def _turned_by_rotors(before: Vec3, inputs: FilterInputs, dt: Scalar) -> Vec3:
-    """Rates in rad/s to which the believed rotors have brought the body."""
+def _turned_by_rotors(memory: NotchMemory, inputs: FilterInputs, dt: Scalar) -> Vec3:
+    """Rates in rad/s to which the believed rotors, and the spin of the body, have brought it."""
     vehicle = inputs.vehicle
-    turn = over_inertia(vehicle, wrench_of(vehicle, inputs.rotors.mean).torque_B)
-    after: Vec3 = before + turn * dt
-    return after
+    given = wrench_of(vehicle, inputs.rotors.mean).torque_B
+    # Of the gyroscopic torques the rates are those that were given last.
+    turning = torque_of_motion(vehicle, memory.rates, residual_speed(vehicle, inputs.speed))
+    after: Vec3 = memory.turned + over_inertia(vehicle, given + turning) * dt
+    reacted = turn_against_rotors(vehicle, residual_speed(vehicle, inputs.sped))
+    return after - (reacted if isinstance(reacted, Vec3) else Vec3(0.0, 0.0, reacted))
 
 
 def _lift(inputs: FilterInputs) -> Vec3:
