@@ -10,7 +10,7 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.autopilot.diagnosis import fault_free
-from rotorfault.autopilot.diagnosis.air_of_model import drag_about_yaw
+from rotorfault.autopilot.diagnosis.air_of_model import drag_about_yaw, felt_about_yaw
 from rotorfault.autopilot.diagnosis.kalman import diagonal
 from rotorfault.autopilot.diagnosis.touch import TouchMemory, pushed, touch_parameters
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
@@ -46,6 +46,39 @@ def test_drag_about_yaw_is_that_of_the_air_at_each_rotor(shift: tuple[float, flo
     offsets = (-shift[1] * m * g / J.x, shift[0] * m * g / J.y)
     assert turned + rows[0] * offsets[0] + rows[1] * offsets[1] == pytest.approx(torque.z / J.z, rel=1e-9)
     assert abs(torque.z / J.z) > 1.0
+
+
+@pytest.mark.parametrize("linear", [0.0, 3e-3])
+@pytest.mark.parametrize("frame", [0.0, 4e-4])
+def test_what_is_felt_tells_the_drag_about_yaw(linear: float, frame: float) -> None:
+    """No airspeed is known: of what the air pushes with, the rotors' share turns the body, at each rotor's place."""
+    vehicle = crazyflie((0.008, -0.005))
+    vehicle = vehicle._replace(
+        linear_drag=linear,
+        air=vehicle.air._replace(frame_drag=Vec3(frame, frame, frame)),  # type: ignore[union-attr]
+    )
+    speeds, v = PerRotor.of((2400.0, 0.0, 2100.0, 1100.0)), Vec3(7.0, -4.0, 0.0)
+    force, torque = air_wrench(vehicle.air, rotor_places(vehicle), speeds, v, zeros())  # type: ignore[arg-type]
+    felt = (force - v * linear) / vehicle.mass
+    assert felt_about_yaw(vehicle, speeds, speeds, felt) == pytest.approx(torque.z, rel=1e-9)
+    assert felt_about_yaw(vehicle, speeds, speeds, zeros()) == 0.0
+
+
+def test_wind_is_no_reason_to_take_back_a_total_loss() -> None:
+    """A rotor is lost in 15 m/s: rotors of unlike speeds have unlike drag, which is no thrust of another rotor."""
+    settings: dict[str, Any] = {
+        "vehicle": "hummingbird",
+        "vehicle.linear_drag.value": 0.0,
+        "vehicle.air.rotor_drag": {"value": 1.19e-4, "unit": "kg/rad", "source": "RotorPy"},
+        "controller.preset": "hummingbird",
+        "duration": 3.0,
+        "fault": [{"kind": "total", "rotor": 1, "time": 0.8}],
+    }
+    directions = np.arange(6) * math.pi / 3.0
+    blown = {"wind.velocity_W.0": 15.0 * np.cos(directions), "wind.velocity_W.1": 15.0 * np.sin(directions)}
+    flown = rf.fly_many("hover-fault", {"seed": np.arange(6), **blown}, settings=settings).table
+    assert min(flown["loss_believed.1"]) > 0.9
+    assert max(flown["false_alarms"]) == 0
 
 
 def test_a_wrong_model_goes_no_further_than_one_can_be() -> None:

@@ -16,9 +16,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from rotorfault.maths.geometry import PerRotor, Vec3
-from rotorfault.maths.scalar import Scalar, absolute
+from rotorfault.maths.scalar import Scalar, absolute, maximum, sqrt
+from rotorfault.model.aerodynamics import Aerodynamics
 from rotorfault.model.mixer import hover_thrust
-from rotorfault.model.vehicle import Vehicle, rotor_speeds
+from rotorfault.model.vehicle import Vehicle, lateral_force, rotor_speeds
 
 
 def air_drag(vehicle: Vehicle) -> tuple[float, float]:
@@ -91,6 +92,40 @@ def drag_about_yaw(
     turned = (x * left - y * forward) * (over / size.sum())
     beside = share / (vehicle.gravity * J.z)
     return turned, (-forward * (J.x * beside), -left * (J.y * beside))
+
+
+def felt_about_yaw(vehicle: Vehicle, speeds: PerRotor, thrust: PerRotor, felt_B: Vec3) -> Scalar:
+    r"""Torque in N m about yaw by the rotors' drag, from what an accelerometer feels across body z.
+
+    There rotors push only if they are tilted; the rest is the air's, whatever wind there is. Rotor i has
+    :math:`k\Omega_i` of the drag over airspeed, with the frame's C, which goes with the square of the airspeed,
+
+    .. math:: \tau_z = 2km\,\frac{\sum\Omega_ix_i\,f_y - \sum\Omega_iy_i\,f_x}{K + \sqrt{K^2 + 4Cm|f|}}, \qquad
+              K = k\sum\Omega_i + k_d
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed, with `air`.
+    speeds : PerRotor, rad/s
+        Of the rotors.
+    thrust : PerRotor, N
+        Of the rotors.
+    felt_B : Vec3, m/s^2
+        Specific force, body axes; zero of a body that feels nothing.
+    """
+    assert isinstance(vehicle.air, Aerodynamics)
+    m, k, size = vehicle.mass, vehicle.air.rotor_drag, speeds.map(absolute)
+    forward, left = felt_B.x, felt_B.y
+    if vehicle.tilt != ():
+        pushed = lateral_force(vehicle, thrust) / m
+        forward, left = forward - pushed.x, left - pushed.y
+    alike, frame = k * size.sum() + vehicle.linear_drag, 0.5 * (vehicle.air.frame_drag.x + vehicle.air.frame_drag.y)
+    over = alike + sqrt(alike * alike + frame * m * 4.0 * sqrt(forward * forward + left * left))
+    turned = vehicle.rotor_x.dot(size) * left - vehicle.rotor_y.dot(size) * forward
+    # Where nothing has drag nothing is felt; the floor keeps the quotient a number.
+    torque: Scalar = turned * (2.0 * k * m / maximum(over, 1e-12))
+    return torque
 
 
 class Blown(NamedTuple):

@@ -31,6 +31,7 @@ from typing import Annotated, Literal, NamedTuple, final
 from pydantic import Field, field_validator
 
 from rotorfault.autopilot.diagnosis import observed_speeds, sensed, standing
+from rotorfault.autopilot.diagnosis.air_of_model import felt_about_yaw
 from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
@@ -324,7 +325,8 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         omega_B = (before.omega_B + now.omega_B) * 0.5
         turning = torque_of_motion(vehicle, omega_B, expectation.residual_speed)
         if vehicle.air != ():
-            turning = turning + torque_of_turning(vehicle, omega_B, expectation.speed)
+            blown = felt_about_yaw(vehicle, expectation.speed, expectation.thrust, inputs.estimate.specific_force_B)
+            turning = turning + torque_of_turning(vehicle, omega_B, expectation.speed) + Vec3(0.0, 0.0, blown)
         return (
             cosine,
             cosine * lift - vehicle.gravity + drag_acceleration(vehicle, Vec3(0.0, 0.0, -climb)).z,
