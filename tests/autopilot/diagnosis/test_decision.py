@@ -193,6 +193,27 @@ def test_a_rotor_that_falls_behind_its_partner_is_not_excused_by_errors_about_ya
         assert list(told.flagged) == expected
 
 
+def named_in_wind(residual: PerRotor, drag: float) -> Diagnosis:
+    """What is told of residuals where the drag of each rotor about yaw is worth so many times the thrust of hover."""
+    errors = Misstated(PerRotor.all(1e-4), PerRotor.all(1e-4), PerRotor.all(drag * HOVER))
+    evidence = Evidence(residual * HOVER, PerRotor.all(HOVER), errors, PerRotor.all(0.0))
+    return decide(undecided(hover=HOVER), evidence, VEHICLE, numbers(persistence=0.0), T)[1]
+
+
+@pytest.mark.parametrize("shift", [-0.8, 0.0, 0.8])
+def test_a_rotor_is_named_and_measured_by_its_partner_whatever_its_drag_did(shift: float) -> None:
+    """Its drag may be gone with its blades: that moves both rotors of its pair, and the others the other way."""
+    told = named_in_wind(PerRotor(shift - 0.9, shift, -shift, -shift), 2.0)
+    assert list(told.flagged) == [1.0, 0.0, 0.0, 0.0]
+    assert told.estimate.r1 == pytest.approx(0.9)
+
+
+def test_drag_excuses_nobody_where_no_rotor_has_lost_any() -> None:
+    """Without a difference across an arm none has lost its blades."""
+    assert list(named_in_wind(PerRotor(-0.9, -0.9, 0.0, 0.0), 2.0).flagged) == [1.0, 1.0, 0.0, 0.0]
+    assert list(named_in_wind(PerRotor(0.0, 0.9, 0.0, 0.0), 0.0).flagged) == [0.0, 1.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize("rotor", [0, 1, 2, 3])
 def test_a_rotor_that_gives_too_much_is_at_fault_and_not_the_others(rotor: int) -> None:
     """And nothing is taken from it: it does not give less when it is asked for less."""

@@ -10,13 +10,15 @@ import pytest
 
 import rotorfault as rf
 from rotorfault.autopilot.diagnosis import fault_free
-from rotorfault.autopilot.diagnosis.air_of_model import drag_about_yaw, felt_about_yaw
+from rotorfault.autopilot.diagnosis.air_of_model import airspeed_felt, drag_about_yaw, drag_of_each
 from rotorfault.autopilot.diagnosis.kalman import diagonal
 from rotorfault.autopilot.diagnosis.touch import TouchMemory, pushed, touch_parameters
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
+from rotorfault.maths.rotation import Quat
 from rotorfault.model.aerodynamics import air_wrench, still_air
 from rotorfault.model.block import Context
 from rotorfault.model.motion import mean_bandwidth
+from rotorfault.model.signals import Estimate
 from rotorfault.model.vehicle import Vehicle, rotor_places
 from rotorfault.model.vehicle_file import load_vehicle
 
@@ -50,22 +52,44 @@ def test_drag_about_yaw_is_that_of_the_air_at_each_rotor(shift: tuple[float, flo
 
 @pytest.mark.parametrize("linear", [0.0, 3e-3])
 @pytest.mark.parametrize("frame", [0.0, 4e-4])
-def test_what_is_felt_tells_the_drag_about_yaw(linear: float, frame: float) -> None:
-    """No airspeed is known: of what the air pushes with, the rotors' share turns the body, at each rotor's place."""
-    vehicle = crazyflie((0.008, -0.005))
-    vehicle = vehicle._replace(
-        linear_drag=linear,
-        air=vehicle.air._replace(frame_drag=Vec3(frame, frame, frame)),  # type: ignore[union-attr]
+def test_what_is_felt_tells_the_airspeed(linear: float, frame: float) -> None:
+    """Of a body that leans and climbs in level wind."""
+    vehicle = crazyflie()._replace(linear_drag=linear)
+    air = vehicle.air._replace(frame_drag=Vec3(frame, frame, 0.0))  # type: ignore[union-attr]
+    speeds, q = PerRotor.of((2400.0, 0.0, 2100.0, 1100.0)), Quat.from_euler(Vec3(0.3, -0.4, 1.1))
+    v_W, wind_W = Vec3(1.0, -2.0, 0.7), Vec3(-9.0, 4.0, 0.0)
+    v = q.matrix().T @ (v_W - wind_W)
+    assert abs(v.z) > 1.0
+    # The frame's drag goes with the size of all of the airspeed, of which the part along body z is left out.
+    places = rotor_places(vehicle)
+    force, torque = air_wrench(air, places, speeds, Vec3(v.x, v.y, 0.0), zeros())
+    vehicle = vehicle._replace(air=air)
+    force = force - v * linear
+    now = Estimate(zeros(), v_W, q, zeros(), force / vehicle.mass)
+    found = airspeed_felt(vehicle, now, speeds, speeds)
+    assert [*found] == pytest.approx([*v], rel=1e-9)
+    each = drag_of_each(vehicle, found, speeds)
+    assert each.sum() == pytest.approx(torque.z)
+    assert each[1] == 0.0
+    still = Estimate(zeros(), zeros(), q, zeros(), zeros())
+    assert [*airspeed_felt(vehicle, still, speeds, speeds)] == [0.0] * 3
+
+
+WHOLE_AIR: dict[str, Any] = {
+    f"vehicle.air.{key}": {"value": value, "unit": unit, "source": "RotorPy"}
+    for key, value, unit in (
+        ("inflow", 2.32e-4, "kg/rad"),
+        ("translational_lift", 3.39e-3, "kg/m"),
+        ("frame_drag_x", 0.5e-2, "kg/m"),
+        ("frame_drag_y", 0.5e-2, "kg/m"),
+        ("frame_drag_z", 1e-2, "kg/m"),
     )
-    speeds, v = PerRotor.of((2400.0, 0.0, 2100.0, 1100.0)), Vec3(7.0, -4.0, 0.0)
-    force, torque = air_wrench(vehicle.air, rotor_places(vehicle), speeds, v, zeros())  # type: ignore[arg-type]
-    felt = (force - v * linear) / vehicle.mass
-    assert felt_about_yaw(vehicle, speeds, speeds, felt) == pytest.approx(torque.z, rel=1e-9)
-    assert felt_about_yaw(vehicle, speeds, speeds, zeros()) == 0.0
+}
 
 
-def test_wind_is_no_reason_to_take_back_a_total_loss() -> None:
-    """A rotor is lost in 15 m/s: rotors of unlike speeds have unlike drag, which is no thrust of another rotor."""
+@pytest.mark.parametrize("air", [{}, WHOLE_AIR])
+def test_wind_is_no_reason_to_blame_a_rotor_or_to_take_a_total_loss_back(air: dict[str, Any]) -> None:
+    """In 15 m/s: rotors of unlike speeds have unlike drag and inflow, which is no thrust of another rotor."""
     settings: dict[str, Any] = {
         "vehicle": "hummingbird",
         "vehicle.linear_drag.value": 0.0,
@@ -73,6 +97,7 @@ def test_wind_is_no_reason_to_take_back_a_total_loss() -> None:
         "controller.preset": "hummingbird",
         "duration": 3.0,
         "fault": [{"kind": "total", "rotor": 1, "time": 0.8}],
+        **air,
     }
     directions = np.arange(6) * math.pi / 3.0
     blown = {"wind.velocity_W.0": 15.0 * np.cos(directions), "wind.velocity_W.1": 15.0 * np.sin(directions)}

@@ -19,7 +19,13 @@ from rotorfault.maths.geometry import PerRotor, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, maximum, sqrt
 from rotorfault.model.aerodynamics import Aerodynamics
 from rotorfault.model.mixer import hover_thrust
+from rotorfault.model.signals import Estimate
 from rotorfault.model.vehicle import Vehicle, lateral_force, rotor_speeds
+
+# m/s: what falls faster has no drag that an airspeed could be told by.
+FASTEST_FALL = 300.0
+# Of tilt, 78 degrees: beyond it the climb says little of the airspeed along body z.
+LEAST_COSINE = 0.2
 
 
 def air_drag(vehicle: Vehicle) -> tuple[float, float]:
@@ -94,38 +100,58 @@ def drag_about_yaw(
     return turned, (-forward * (J.x * beside), -left * (J.y * beside))
 
 
-def felt_about_yaw(vehicle: Vehicle, speeds: PerRotor, thrust: PerRotor, felt_B: Vec3) -> Scalar:
-    r"""Torque in N m about yaw by the rotors' drag, from what an accelerometer feels across body z.
+def airspeed_felt(vehicle: Vehicle, now: Estimate, speeds: PerRotor, thrust: PerRotor) -> Vec3:
+    r"""Velocity in m/s against the air, body axes, by what an accelerometer feels across body z, in level wind.
 
-    There rotors push only if they are tilted; the rest is the air's, whatever wind there is. Rotor i has
-    :math:`k\Omega_i` of the drag over airspeed, with the frame's C, which goes with the square of the airspeed,
+    There rotors push only if they are tilted; the rest is drag, of the rotors, linear, and of the frame, C, which
+    goes with the square of the airspeed:
 
-    .. math:: \tau_z = 2km\,\frac{\sum\Omega_ix_i\,f_y - \sum\Omega_iy_i\,f_x}{K + \sqrt{K^2 + 4Cm|f|}}, \qquad
-              K = k\sum\Omega_i + k_d
+    .. math:: v_\perp = -\frac{2mf_\perp}{K + \sqrt{K^2 + 4Cm|f_\perp|}}, \qquad K = k\sum\Omega_i + k_d
+
+    and along body z it is what makes it the estimated climb along the vertical.
 
     Parameters
     ----------
     vehicle : Vehicle
         As believed, with `air`.
+    now : Estimate
+        Its specific force is zero where nothing is felt; then this is zero but for the climb.
     speeds : PerRotor, rad/s
         Of the rotors.
     thrust : PerRotor, N
         Of the rotors.
-    felt_B : Vec3, m/s^2
-        Specific force, body axes; zero of a body that feels nothing.
     """
     assert isinstance(vehicle.air, Aerodynamics)
-    m, k, size = vehicle.mass, vehicle.air.rotor_drag, speeds.map(absolute)
-    forward, left = felt_B.x, felt_B.y
+    m, R_WB = vehicle.mass, now.q_WB.matrix()
+    forward, left = now.specific_force_B.x, now.specific_force_B.y
     if vehicle.tilt != ():
         pushed = lateral_force(vehicle, thrust) / m
         forward, left = forward - pushed.x, left - pushed.y
-    alike, frame = k * size.sum() + vehicle.linear_drag, 0.5 * (vehicle.air.frame_drag.x + vehicle.air.frame_drag.y)
+    alike = vehicle.air.rotor_drag * speeds.map(absolute).sum() + vehicle.linear_drag
+    frame = 0.5 * (vehicle.air.frame_drag.x + vehicle.air.frame_drag.y)
     over = alike + sqrt(alike * alike + frame * m * 4.0 * sqrt(forward * forward + left * left))
-    turned = vehicle.rotor_x.dot(size) * left - vehicle.rotor_y.dot(size) * forward
-    # Where nothing has drag nothing is felt; the floor keeps the quotient a number.
-    torque: Scalar = turned * (2.0 * k * m / maximum(over, 1e-12))
-    return torque
+    per_force = 2.0 * m / maximum(over, 2.0 * m * vehicle.gravity / FASTEST_FALL)
+    x, y = -forward * per_force, -left * per_force
+    upright = R_WB.zz / maximum(R_WB.zz * R_WB.zz, LEAST_COSINE * LEAST_COSINE)
+    return Vec3(x, y, (now.v_W.z - R_WB.zx * x - R_WB.zy * y) * upright)
+
+
+def drag_of_each(vehicle: Vehicle, airspeed_B: Vec3, speeds: PerRotor) -> PerRotor:
+    """Torque in N m about yaw by the drag of each rotor.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As believed, with `air`.
+    airspeed_B : Vec3, m/s
+        Velocity against the air, body axes.
+    speeds : PerRotor, rad/s
+        Of the rotors.
+    """
+    assert isinstance(vehicle.air, Aerodynamics)
+    across = vehicle.rotor_y * airspeed_B.x - vehicle.rotor_x * airspeed_B.y
+    turned: PerRotor = across * speeds.map(absolute) * vehicle.air.rotor_drag
+    return turned
 
 
 class Blown(NamedTuple):

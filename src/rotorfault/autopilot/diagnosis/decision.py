@@ -48,6 +48,7 @@ from rotorfault.maths.scalar import (
     absolute,
     both,
     clip,
+    either,
     exp,
     greater,
     greater_equal,
@@ -251,6 +252,10 @@ def decide(
     blend = select(less_equal(p.smoothing, 0.0), 1.0, 1.0 - exp(-dt / maximum(p.smoothing, 1e-9)))
     small = p.test_thrust * hover
 
+    def weighed(f: Scalar, noise: Scalar) -> Scalar:
+        """Missing thrust in N that no error of the model explains."""
+        return maximum(p.threshold * maximum(f, hover), p.noise * noise)
+
     def one(
         loss: Scalar,
         r: Scalar,
@@ -264,11 +269,16 @@ def decide(
         was: DecisionMemory,
     ) -> tuple[Scalar, ...]:
         off, large = sound - r, maximum(f, hover)
-        base = maximum(p.threshold * large, p.noise * noise)
+        base = weighed(f, noise)
         # No pair is a measure while a rotor gives too much, for what that does to the others is in no model; nor is a
         # partner at fault.
         behind, near = maximum(partner - r, 0.0), base * base + beside
-        comparable = both(both(greater(behind * behind, near), less(excess * excess, near)), negated(at_fault))
+        bearable = near if isinstance(blown, tuple) else near + blown
+        comparable = both(both(greater(behind * behind, near), less(excess * excess, bearable)), negated(at_fault))
+        if not isinstance(blown, tuple):
+            # What is gone of its drag moves it and its partner alike, and the others the other way.
+            off = select(comparable, behind, off)
+            loss = select(comparable, clip(off * over_f, 0.0, 1.0), loss)
         threshold = sqrt(base * base + select(comparable, minimum(beside, any_), any_))
         suspected = greater(absolute(off), threshold)
         since = select(suspected, was.suspected + dt, 0.0)
@@ -293,7 +303,7 @@ def decide(
         again = greater_equal(was.tested, p.test_interval)
         tested = select(doubted, select(again, 0.0, was.tested + dt), 0.0)
         test = select(both(doubted, less(tested, p.test_time)), small, 0.0)
-        return threshold, test, since, below, flagged, smoothed, tested
+        return threshold, loss, test, since, below, flagged, smoothed, tested
 
     before = (DecisionMemory._make((*values, memory.stuck)) for values in zip(*memory[:-1], strict=True))
 
@@ -306,6 +316,17 @@ def decide(
     else:  # no rotor has a partner, so none is better than the second best
         partners, at_fault = evidence.residual, PerRotor.all(1.0, vehicle.rotors)
 
+    any_other, beside, drag = evidence.model_error
+    blown: Scalar | tuple[()] = ()
+    if isinstance(drag, PerRotor):
+        # A rotor that has lost its blades has lost their drag with them, one that slips has not. Where each gives as
+        # much as its partner, and none is flagged, none has.
+        near = evidence.thrust.map(weighed, evidence.noise).map(lambda base, wrong: sqrt(base * base + wrong), beside)
+        behind = (partners - evidence.residual).map(greater, near)
+        gone = behind.map(either, memory.flagged).reduce(either)
+        most = drag.reduce(maximum) * gone
+        blown = most * most
+        any_other = any_other.map(lambda x: x + blown)
     known = (
         evidence.residual,
         partners,
@@ -313,11 +334,12 @@ def decide(
         evidence.thrust,
         per_thrust,
         evidence.noise,
-        *evidence.model_error,
+        any_other,
+        beside,
     )
     rows = zip(losses, *known, before, strict=True)
     columns = (PerRotor.of(column) for column in zip(*(one(*row) for row in rows), strict=True))
-    threshold, test, since, below, flagged, smoothed, tested = columns
+    threshold, losses, test, since, below, flagged, smoothed, tested = columns
     seen = Seen(late, evidence.residual, partners, at_fault, flagged)
     judgement, held = judged(memory.stuck, seen, sound, hover, p.stuck, dt)
     decided = DecisionMemory(since, below, flagged, smoothed, tested, late, judgement)

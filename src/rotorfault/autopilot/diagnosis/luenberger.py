@@ -31,7 +31,7 @@ from typing import Annotated, Literal, NamedTuple, final
 from pydantic import Field, field_validator
 
 from rotorfault.autopilot.diagnosis import observed_speeds, sensed, standing
-from rotorfault.autopilot.diagnosis.air_of_model import felt_about_yaw
+from rotorfault.autopilot.diagnosis.air_of_model import airspeed_felt, drag_of_each
 from rotorfault.autopilot.diagnosis.decision import (
     DecisionMemory,
     DecisionParameters,
@@ -59,7 +59,8 @@ from rotorfault.autopilot.prediction import reaction
 from rotorfault.base.config import Strict
 from rotorfault.base.errors import InputError
 from rotorfault.maths.geometry import PerRotor, Vec3, zeros
-from rotorfault.maths.scalar import Scalar, either, maximum
+from rotorfault.maths.scalar import Scalar, absolute, either, maximum
+from rotorfault.model.aerodynamics import Aerodynamics, air_wrench
 from rotorfault.model.block import Context, Record
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust, nominal_inverse
@@ -69,12 +70,11 @@ from rotorfault.model.motion import (
     mean_bandwidth,
     mean_of,
     torque_of_motion,
-    torque_of_turning,
 )
 from rotorfault.model.signals import Diagnosis, Wrench
 from rotorfault.model.slot import register
 from rotorfault.model.telemetry import NO_FRAME, Q
-from rotorfault.model.vehicle import body_momentum, over_inertia, wrench_of
+from rotorfault.model.vehicle import body_momentum, over_inertia, rotor_places, wrench_of
 
 Form = Literal["injected", "linear", "lag_states"]
 # Of tilt, 78 degrees: below it the vertical balance hardly sees the thrust. Our choice: an innovation is amplified
@@ -301,11 +301,15 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
     ) -> Evidence:
         """What the deviation from the believed wrench says of each rotor."""
         vehicle, thrust, shares = inputs.vehicle, inputs.expectation.thrust, parameters.decision.model
+        drag = () if vehicle.air == () else drag_of_each(vehicle, _airspeed(inputs), inputs.expectation.speed)
         if vehicle.pairs != ():
             noise = PerRotor.all(noise_of(wrong, vehicle, parameters.dynamics), vehicle.rotors)
             residual = nominal_inverse(vehicle, deviation)
-            return Evidence(residual, thrust, misstated(wrong, flagged, shares, vehicle), noise)
+            return Evidence(residual, thrust, misstated(wrong, flagged, shares, vehicle, drag), noise)
         noisy, uncertain = torque_variances(wrong, flagged, shares, vehicle, parameters.dynamics)
+        if isinstance(drag, PerRotor):
+            gone = (drag * flagged).map(absolute).reduce(maximum)
+            uncertain = uncertain + Vec3(0.0, 0.0, gone * gone)
         most, apart = mean_of(greatest_thrust(vehicle)), parameters.decision.noise
         rows = effectiveness(vehicle)
         found = explained(rows, deviation.torque_B, noisy, uncertain, flagged, most, apart)
@@ -325,10 +329,21 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
         omega_B = (before.omega_B + now.omega_B) * 0.5
         turning = torque_of_motion(vehicle, omega_B, expectation.residual_speed)
         if vehicle.air != ():
-            blown = felt_about_yaw(vehicle, expectation.speed, expectation.thrust, inputs.estimate.specific_force_B)
-            turning = turning + torque_of_turning(vehicle, omega_B, expectation.speed) + Vec3(0.0, 0.0, blown)
+            turning = turning + _pushed(inputs, omega_B)
         return (
             cosine,
             cosine * lift - vehicle.gravity + drag_acceleration(vehicle, Vec3(0.0, 0.0, -climb)).z,
             turn + over_inertia(vehicle, turning),
         )
+
+
+def _airspeed(inputs: DiagnosisInputs) -> Vec3:
+    e = inputs.expectation
+    return airspeed_felt(inputs.vehicle, inputs.estimate, e.speed, e.thrust)
+
+
+def _pushed(inputs: DiagnosisInputs, omega_B: Vec3) -> Vec3:
+    """Torque in N m of the air on a sound vehicle, body axes."""
+    vehicle, speeds = inputs.vehicle, inputs.expectation.speed
+    assert isinstance(vehicle.air, Aerodynamics)
+    return air_wrench(vehicle.air, rotor_places(vehicle), speeds, _airspeed(inputs), omega_B)[1]

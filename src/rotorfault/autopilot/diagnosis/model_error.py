@@ -240,9 +240,16 @@ class Misstated(NamedTuple):
 
     any: PerRotor  # N^2: behind any other
     partner: PerRotor  # N^2: behind the one opposite, which a torque about the yaw axis cannot tell from it
+    drag: PerRotor | tuple[()] = ()  # N: behind any other, by the drag of each rotor; empty where none has any
 
 
-def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehicle: Vehicle) -> Misstated:
+def misstated(
+    memory: ModelErrorMemory,
+    flagged: PerRotor,
+    shares: Shares,
+    vehicle: Vehicle,
+    drag: PerRotor | tuple[()] = (),
+) -> Misstated:
     """How much less thrust than another a sound rotor may seem to give by a wrong model.
 
     The errors are taken as independent, so their squares add.
@@ -255,6 +262,8 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
     shares : Shares
     vehicle : Vehicle
         As believed.
+    drag : PerRotor, N m, optional
+        Torques about yaw by the drag of each rotor; empty where none has any.
     """
     inertia = vehicle.inertia
     torque = _by_inertia(memory, shares, vehicle)
@@ -276,7 +285,8 @@ def misstated(memory: ModelErrorMemory, flagged: PerRotor, shares: Shares, vehic
     lagged = memory.lagging.map(lambda lagging: square(lagging, 0.0))
     first, second = arm_12 * arm_12, arm_34 * arm_34
     beside = from_pairs(vehicle, PerRotor(first, first, second, second))
-    return Misstated(any_other, lagged + beside)
+    blown = () if isinstance(drag, tuple) else drag.map(absolute) * (0.5 * about_yaw)
+    return Misstated(any_other, lagged + beside, blown)
 
 
 def _by_inertia(memory: ModelErrorMemory, shares: Shares, vehicle: Vehicle) -> Vec3:
