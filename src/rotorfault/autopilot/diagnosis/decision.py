@@ -48,7 +48,6 @@ from rotorfault.maths.scalar import (
     absolute,
     both,
     clip,
-    either,
     exp,
     greater,
     greater_equal,
@@ -252,10 +251,6 @@ def decide(
     blend = select(less_equal(p.smoothing, 0.0), 1.0, 1.0 - exp(-dt / maximum(p.smoothing, 1e-9)))
     small = p.test_thrust * hover
 
-    def weighed(f: Scalar, noise: Scalar) -> Scalar:
-        """Missing thrust in N that no error of the model explains."""
-        return maximum(p.threshold * maximum(f, hover), p.noise * noise)
-
     def one(
         loss: Scalar,
         r: Scalar,
@@ -269,16 +264,21 @@ def decide(
         was: DecisionMemory,
     ) -> tuple[Scalar, ...]:
         off, large = sound - r, maximum(f, hover)
-        base = weighed(f, noise)
+        base = maximum(p.threshold * large, p.noise * noise)
         # No pair is a measure while a rotor gives too much, for what that does to the others is in no model; nor is a
         # partner at fault.
         behind, near = maximum(partner - r, 0.0), base * base + beside
-        bearable = near if isinstance(blown, tuple) else near + blown
+        bearable = near
+        if not isinstance(blown, tuple):
+            # No error with a deviation but a force with a bound, so sizes add.
+            bearable, any_ = ((sqrt(x) + blown) * (sqrt(x) + blown) for x in (near, base * base + any_))
+            any_ = any_ - base * base
         comparable = both(both(greater(behind * behind, near), less(excess * excess, bearable)), negated(at_fault))
         if not isinstance(blown, tuple):
             # What is gone of its drag moves it and its partner alike, and the others the other way.
-            off = select(comparable, behind, off)
-            loss = select(comparable, clip(off * over_f, 0.0, 1.0), loss)
+            measure = both(comparable, less(0.0, blown))
+            off = select(measure, behind, off)
+            loss = select(measure, clip(off * over_f, 0.0, 1.0), loss)
         threshold = sqrt(base * base + select(comparable, minimum(beside, any_), any_))
         suspected = greater(absolute(off), threshold)
         since = select(suspected, was.suspected + dt, 0.0)
@@ -319,14 +319,9 @@ def decide(
     any_other, beside, drag = evidence.model_error
     blown: Scalar | tuple[()] = ()
     if isinstance(drag, PerRotor):
-        # A rotor that has lost its blades has lost their drag with them, one that slips has not. Where each gives as
-        # much as its partner, and none is flagged, none has.
-        near = evidence.thrust.map(weighed, evidence.noise).map(lambda base, wrong: sqrt(base * base + wrong), beside)
-        behind = (partners - evidence.residual).map(greater, near)
-        gone = behind.map(either, memory.flagged).reduce(either)
-        most = drag.reduce(maximum) * gone
-        blown = most * most
-        any_other = any_other.map(lambda x: x + blown)
+        # A rotor that has lost its blades has lost their drag with them, one that slips has not.
+        behind = (partners - evidence.residual).map(lambda lacks, over_f: clip(lacks * over_f, 0.0, 1.0), per_thrust)
+        blown = (drag * behind.map(maximum, memory.flagged)).reduce(maximum)
     known = (
         evidence.residual,
         partners,

@@ -301,14 +301,14 @@ class Luenberger(Diagnoser[LuenbergerMemory, LuenbergerParameters]):
     ) -> Evidence:
         """What the deviation from the believed wrench says of each rotor."""
         vehicle, thrust, shares = inputs.vehicle, inputs.expectation.thrust, parameters.decision.model
-        drag = () if vehicle.air == () else drag_of_each(vehicle, _airspeed(inputs), inputs.expectation.speed)
+        drag = () if vehicle.air == () else _most_drag(inputs)
         if vehicle.pairs != ():
             noise = PerRotor.all(noise_of(wrong, vehicle, parameters.dynamics), vehicle.rotors)
             residual = nominal_inverse(vehicle, deviation)
             return Evidence(residual, thrust, misstated(wrong, flagged, shares, vehicle, drag), noise)
         noisy, uncertain = torque_variances(wrong, flagged, shares, vehicle, parameters.dynamics)
         if isinstance(drag, PerRotor):
-            gone = (drag * flagged).map(absolute).reduce(maximum)
+            gone = (drag * flagged).reduce(maximum)
             uncertain = uncertain + Vec3(0.0, 0.0, gone * gone)
         most, apart = mean_of(greatest_thrust(vehicle)), parameters.decision.noise
         rows = effectiveness(vehicle)
@@ -347,3 +347,11 @@ def _pushed(inputs: DiagnosisInputs, omega_B: Vec3) -> Vec3:
     vehicle, speeds = inputs.vehicle, inputs.expectation.speed
     assert isinstance(vehicle.air, Aerodynamics)
     return air_wrench(vehicle.air, rotor_places(vehicle), speeds, _airspeed(inputs), omega_B)[1]
+
+
+def _most_drag(inputs: DiagnosisInputs) -> PerRotor:
+    """Most torque in N m about yaw by the drag of each rotor, at the speed of the fastest: it shows late."""
+    speeds = inputs.expectation.speed.map(absolute)
+    fastest = PerRotor.all(speeds.reduce(maximum), len(speeds))
+    most: PerRotor = drag_of_each(inputs.vehicle, _airspeed(inputs), fastest).map(absolute)
+    return most

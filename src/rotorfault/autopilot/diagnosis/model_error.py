@@ -263,7 +263,7 @@ def misstated(
     vehicle : Vehicle
         As believed.
     drag : PerRotor, N m, optional
-        Torques about yaw by the drag of each rotor; empty where none has any.
+        Most torque about yaw by the drag of each rotor; empty where none has any.
     """
     inertia = vehicle.inertia
     torque = _by_inertia(memory, shares, vehicle)
@@ -285,7 +285,7 @@ def misstated(
     lagged = memory.lagging.map(lambda lagging: square(lagging, 0.0))
     first, second = arm_12 * arm_12, arm_34 * arm_34
     beside = from_pairs(vehicle, PerRotor(first, first, second, second))
-    blown = () if isinstance(drag, tuple) else drag.map(absolute) * (0.5 * about_yaw)
+    blown = () if isinstance(drag, tuple) else drag * (0.5 * about_yaw)
     return Misstated(any_other, lagged + beside, blown)
 
 
