@@ -82,6 +82,24 @@ def test_settings_stand_over_all_that_the_study_says() -> None:
     assert scenario.duration == 2.0
 
 
+def test_a_setting_in_place_of_what_variants_compare_leaves_one_called_by_it() -> None:
+    each = [{"label": kind, "settings": {"diagnosis.kind": kind}} for kind in ("luenberger", "oracle")]
+    (only,) = changed(tiny(variant=each), settings={"diagnosis": "glr", "duration": 2.0}).variant
+    assert only.label == "glr"
+    kept = changed(tiny(variant=each), settings={"duration": 2.0})
+    assert [one.label for one in kept.variant] == ["luenberger", "oracle"]
+
+
+def test_a_setting_that_makes_some_variants_the_same_is_refused() -> None:
+    rates = [
+        {"label": f"{rate} per hour", "settings": {"diagnosis": {"kind": "glr", "false_alarms": rate}}}
+        for rate in (1, 10)
+    ]
+    study = tiny(variant=[*rates, {"label": "models", "settings": {"diagnosis": "multiple_model"}}])
+    with pytest.raises(InputError, match="'1 per hour' and '10 per hour' differ by it alone"):
+        changed(study, settings={"diagnosis.false_alarms": 0.1})
+
+
 def test_what_is_named_here_may_run_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "trap.py").write_text("raise RuntimeError('it ran')\n")
     trap = f"{tmp_path / 'trap.py'}:Part"

@@ -178,6 +178,14 @@ USAGE = [
     ("fly --no-figuers", "unknown option '--no-figuers'; did you mean '--no-figures'? (allowed: --controller,"),
     ("fli", "unknown command 'fli'; did you mean 'fly'? (allowed: animate,"),
     ("trim paper hummingbird", "'hummingbird' is too much (allowed: VEHICLE); see 'rotorfault trim --help'"),
+    ("trim paper --dead 1 2", "'2' is too much: --dead takes one value; give --dead once for each"),
+    ("trim paper --dead 1,2", "--dead: got '1,2'; allowed: a whole number; give --dead once for each"),
+    ("trim paper --loss 1=0.3 2=0.4", "'2=0.4' is too much: --loss takes one value; give --loss once for each"),
+    (
+        "fly hover-fault --set start.position=[0,0,a]",
+        "--set 'start.position=[0,0,a]': not valid TOML: Invalid value; allowed:",
+    ),
+    ('fly hover-fault --set fault=[{kind="total"}', "--set 'fault=[{kind=\"total\"}': not valid TOML: Unclosed array; allowed:"),
 ]
 
 

@@ -171,6 +171,8 @@ def _parts(detail: ErrorDetails) -> tuple[list[str], str]:
         keys += str(context["key"]).split(".") if context.get("key") else []
     elif detail["type"] == "missing":
         message = "is missing; add it"
+    elif detail["type"] in ("int_from_float", "int_parsing", "int_type"):
+        message = f"must be a whole number; got {short(detail['input'])}"
     else:
         message = re.sub(r"^(Input|String|Tuple|List) should", "must", message).replace("Value error, ", "")
         message = re.sub(r"a valid dictionary or instance of \w+", "a table", message)

@@ -89,7 +89,9 @@ def changed(
     for one in [preset] if isinstance(preset, str) else preset or ():
         _give_preset(study, tables, one)
     if given:
+        compared = study_from(tables, study.name)
         tables["overrides"] = {**tables["overrides"], **given}
+        tables["variant"] = _told_apart(compared, study_from(tables, study.name), given)
     if seed is not None:
         tables["seed"] = seed
     if quick:
@@ -197,6 +199,31 @@ def _require_fixed(study: Study, keys: Sequence[str]) -> None:
                     f"{key}: the study varies it, by its axis or draw '{name}'; allowed: what no axis or draw "
                     f"varies, or a study without '{name}'"
                 )
+
+
+def _told_apart(before: Study, after: Study, given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The variants once settings stand over them: one, called by these, where they set all that is compared.
+
+    Raises
+    ------
+    InputError
+        If settings make some variants the same and leave others: labels would be of what is not flown.
+    """
+    variants: list[dict[str, Any]] = after.as_tables()["variant"]
+    old, new = ([study.tables_of(number) for number in range(len(variants))] for study in (before, after))
+    alike = [(i, k) for k in range(len(new)) for i in range(k) if new[i] == new[k] and old[i] != old[k]]
+    if not alike:
+        return variants
+    compared = {part for tables in old for part in tables if tables[part] != old[0].get(part)}
+    setting = {key: value for key, value in given.items() if key.partition(".")[0] in compared}
+    if any(tables != new[0] for tables in new):
+        one, other = (variants[number]["label"] for number in alike[0])
+        raise InputError(
+            f"{', '.join(setting)}: the variants '{one}' and '{other}' differ by it alone; allowed: what variants do "
+            "not compare, or a copy of the study with variants of your own"
+        )
+    words = [_labels([value])[0] if isinstance(value, str) else f"{key}={value}" for key, value in setting.items()]
+    return [{**variants[0], "label": ", ".join(words)[:LONGEST_LABEL], "settings": {}}]
 
 
 def _variants(tables: dict[str, Any], names: list[str]) -> list[dict[str, Any]]:

@@ -124,7 +124,10 @@ def trim(
     file = load_vehicle(vehicle)
     if dead:
         if losses or preset is not None or controller != "roismc":
-            raise InputError("--dead goes without --loss, --controller and --preset: relaxed hover has neither")
+            raise InputError(
+                "--dead goes without --loss, --controller and --preset, for relaxed hover has no partial losses "
+                "and no controller; leave them out, or leave --dead out"
+            )
         from rotorfault.analysis.relaxed_hover import relaxed_hover, relaxed_lines
         from rotorfault.analysis.vehicle_settings import vehicle_with
 

@@ -40,12 +40,26 @@ def refusal(error: Any, given: Sequence[str]) -> str:
         count = "".join(filter(str.isdigit, text.rpartition("requires")[2]))  # the parser gives no option with it
         return f"{error.option_name} needs {f'{count} values' if count else 'a value'} after it; {mend}"
     if kind == "BadParameter" and parameter is not None:
-        return f"{name}: got {short(_value(parameter, given))}; allowed: {_allowed(parameter, text)}"
+        again = f"; give {name} once for each" if getattr(parameter, "multiple", False) else ""
+        return f"{name}: got {short(_value(parameter, given))}; allowed: {_allowed(parameter, text)}{again}"
     if "extra argument" in text:
         wanted = [_called(one, given) for one in context.command.params if one.param_type_name == "argument"]
         extra = text.rpartition("(")[2].rstrip(")")
+        if repeated := _one_value_each(context.command.params, given, extra):
+            quoted = "" if extra[:1].isdigit() else ", and put what has blanks or brackets into single quotes"
+            return f"'{extra}' is too much: {repeated} takes one value; give {repeated} once for each{quoted}"
         return f"'{extra}' is too much ({choices(wanted)}); {mend}, and put names with blanks into quotes"
     return f"{text}; {mend}"
+
+
+def _one_value_each(parameters: Sequence[Any], given: Sequence[str], extra: str) -> str:
+    """The option that may be repeated and got several values at once, which are the extra words; else empty."""
+    for parameter in parameters:
+        for at, word in enumerate(given):
+            several = getattr(parameter, "multiple", False) and word in _names(parameter)
+            if several and extra.split()[:1] == list(given[at + 2 : at + 3]):
+                return word
+    return ""
 
 
 def _names(parameter: Any) -> list[str]:

@@ -46,10 +46,10 @@ def off_grid(name: str, rate: int, delay_ms: int, period: float) -> tuple[str, s
     """
     periods = 1.0 / (rate * period) if rate else 1.0
     if periods < 1.0 - _ROUNDING or abs(periods - round(periods)) > _ROUNDING * periods:
-        near = max(1, round(periods))
+        near = _whole_rates(rate, period)
+        allowed = f"whole periods, such as {near} Hz" if near else "a 'period' of which a second has whole ones"
         return f"{name}.rate", (
-            f"got {rate} Hz, every {periods:.4g} sampling periods of {period:g} s; allowed: whole periods, such as "
-            f"{1.0 / (near * period):.6g} Hz, or 0 for every sampling instant"
+            f"got {rate} Hz, every {periods:.4g} sampling periods of {period:g} s; allowed: {allowed}"
         )
     periods = delay_ms * 1e-3 / period
     if abs(periods - round(periods)) > _ROUNDING * max(1.0, periods):
@@ -58,6 +58,17 @@ def off_grid(name: str, rate: int, delay_ms: int, period: float) -> tuple[str, s
             f"{round(periods) * period * 1e3:.6g} ms"
         )
     return None
+
+
+def _whole_rates(rate: int, period: float) -> str:
+    """The nearest rates below and above, in whole Hz as settings have them, that are whole sampling periods."""
+    instants = 1.0 / period
+    top = round(instants)
+    if top < 1 or abs(instants - top) > _ROUNDING * instants:
+        return ""
+    whole = [one for one in range(1, top + 1) if top % one == 0]
+    below, above = [one for one in whole if one < rate], [one for one in whole if one > rate]
+    return " or ".join(str(one) for one in (*below[-1:], *above[:1]))
 
 
 def require_whole(name: str, rate: int, delay_ms: int, period: float) -> None:

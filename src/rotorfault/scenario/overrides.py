@@ -147,7 +147,7 @@ def parse_overrides(pairs: list[str]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If a text has no '=' or no key.
+        If a text has no '=' or no key, or if its value begins a list or a table of TOML and is none.
     """
     found: dict[str, Any] = {}
     for pair in pairs:
@@ -156,7 +156,13 @@ def parse_overrides(pairs: list[str]) -> dict[str, Any]:
             raise InputError(f"--set {pair}: allowed: key=value with a dotted key, such as fault.0.loss=0.3")
         try:
             found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+        except tomllib.TOMLDecodeError as error:
+            if text.lstrip()[:1] in ("[", "{"):  # no name begins so: quotes or brackets are missing
+                wrong = str(error).partition(" (at")[0]
+                raise InputError(
+                    f"--set {short(pair)}: not valid TOML: {wrong}; allowed: a list or table, texts in it in double "
+                    """quotes, the whole in single ones, such as --set 'fault=[{kind="total",rotor=1,time=1}]'"""
+                ) from None
             found[key.strip()] = text.strip()
         except (ValueError, RecursionError):
             found[key.strip()] = text.strip()  # digits or brackets without end: no value of any key
