@@ -185,7 +185,7 @@ USAGE = [
         "fly hover-fault --set start.position=[0,0,a]",
         "--set 'start.position=[0,0,a]': not valid TOML: Invalid value; allowed:",
     ),
-    ('fly hover-fault --set fault=[{kind="total"}', "--set 'fault=[{kind=\"total\"}': not valid TOML: Unclosed array; allowed:"),
+    ("fly hover-fault --set fault=[{}", "--set 'fault=[{}': not valid TOML: Unclosed array; allowed:"),
 ]
 
 

@@ -41,3 +41,13 @@ def test_no_more_slices_than_can_be_looked_at() -> None:
     assert (len(parts), count) == (curves.MOST_SLICES, 9)
     assert (parts[0].title, parts[-1].title) == ("mass 0.8", "mass 1.2")
     assert "6 of 9" in figures.draw(found)["success-one"].legends[0].get_title().get_text()
+
+
+def test_numbers_of_flights_have_a_map_where_they_differ() -> None:
+    study = STUDIES["plane"]
+    alike = figures.draw(maps(study, table_of(study, falling)))["success"]
+    assert "each cell: 8 flights" in [text.get_text() for text in alike.legends[0].get_texts()]
+    refined = figures.draw(maps(study, table_of(study, falling, lambda _, cell: 8 if cell else 16)))["success"]
+    labels = [[axes.get_ylabel() for axes in one.axes] for one in (alike, refined)]
+    assert ["flights (–)" in one for one in labels] == [False, True]
+    check_nothing_covered("refined", refined)

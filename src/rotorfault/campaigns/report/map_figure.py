@@ -41,7 +41,11 @@ WITHOUT_YAW: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (2.4, 1.2)),
 DOTS: dict[str, Any] = {"color": BLACK, "marker": "o", "markersize": 2.4, "linestyle": "none"}
 EMPTY = "0.85"
 NOT_FLOWN: dict[str, Any] = {"facecolor": EMPTY, "edgecolor": "0.6", "linewidth": 0.0, "hatch": "/////"}
-GUESS: dict[str, Any] = {"color": "0.35", "linestyle": (0, (4.0, 3.0)), "linewidth": 0.6}  # between coarse cells
+# Between coarse cells, where they run is not known: thin, and told apart by their dashes.
+GUESSES: dict[float, dict[str, Any]] = {
+    0.5: {"color": "0.35", "linestyle": (0, (9.0, 3.0)), "linewidth": 0.7},
+    0.99: {"color": "0.35", "linestyle": (0, (2.4, 2.4)), "linewidth": 0.7},
+}
 
 
 class MapPanel(NamedTuple):
@@ -53,8 +57,9 @@ class MapPanel(NamedTuple):
 
 
 def success_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Figure:
-    """Success rates with boundaries and limits; below each map the number of flights."""
-    figure, grid = _grid(maps, panels, title)
+    """Success rates with boundaries and limits; below each map the number of flights, where it is not the same."""
+    counts = np.unique([panel.part.of(maps.variants[panel.which].flights) for panel in panels])
+    figure, grid = _grid(maps, panels, title, rows=1 if len(counts) == 1 else 2)
     most = max(int(variant.flights.max()) for variant in maps.variants)
     handles: dict[str, Artist] = {}
     meshes: dict[str, QuadMesh] = {}
@@ -62,8 +67,9 @@ def success_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Fig
         variant = maps.variants[panel.which]
         rate, flights = panel.part.of(variant.success_rate), panel.part.of(variant.flights)
         meshes["success rate"] = _mesh(axes, maps, rate, SUCCESS_COLOURS, (0.0, 1.0))
-        flown = np.where(flights > 0, flights, np.nan)
-        meshes["flights"] = _mesh(below, maps, flown, FLIGHTS_COLOURS, (0.0, float(most)))
+        if below is not axes:
+            flown = np.where(flights > 0, flights, np.nan)
+            meshes["flights"] = _mesh(below, maps, flown, FLIGHTS_COLOURS, (0.0, float(most)))
         if np.isnan(rate).any():
             handles["not flown"] = Patch(**NOT_FLOWN)
         if not np.nan_to_num(rate).any():
@@ -71,7 +77,9 @@ def success_maps(maps: Maps, panels: Sequence[MapPanel], title: str = "") -> Fig
         _limits(axes, maps, panel, handles)
         for level in LEVELS:
             _boundary(axes, maps, crossings(maps, variant, panel.part, level), handles)
-    _bars(figure, grid, meshes, ("success rate (–)", "flights (–)"))
+    if len(counts) == 1:
+        handles[f"each cell: {counts[0]:,} flight{'' if counts[0] == 1 else 's'}"] = Line2D([], [], linestyle="none")
+    _bars(figure, grid, meshes, ("success rate (–)", "flights (–)")[: len(meshes)])
     _legend(figure, handles, _title(maps, panels, title))
     return figure
 
@@ -181,7 +189,7 @@ def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Art
     for line in crossed.lines:
         along = x.coordinates(line[:, 0]), y.coordinates(line[:, 1])
         if guessed:
-            axes.plot(*along, zorder=3.1, **GUESS)
+            axes.plot(*along, zorder=3.1, **GUESSES[crossed.level])
         else:
             _line(axes, *along, style, 3.0)
     if not len(crossed.points):
@@ -200,7 +208,7 @@ def _boundary(axes: Axes, maps: Maps, crossed: Crossings, handles: dict[str, Art
             ecolor=style["color"], elinewidth=0.8, capsize=1.6, capthick=0.8, zorder=3.2,
         )  # fmt: skip
     if guessed:
-        style = GUESS
+        style = GUESSES[crossed.level]
     elif not crossed.lines:  # crossings of lines that are no neighbours
         style = {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 3.0, "zorder": 3.3}
         style["markerfacecolor"] = BLACK if crossed.level == LEVELS[0] else "white"
