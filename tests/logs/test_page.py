@@ -13,8 +13,9 @@ from rotorfault.logs.api import write_pages
 from rotorfault.logs.detectors import order_of
 from rotorfault.logs.diagnose import diagnosis_of
 from rotorfault.logs.log import Log, Series, named_layout
-from rotorfault.logs.page import data_of
+from rotorfault.logs.page import data_of, shown
 from rotorfault.model.vehicle_file import load_vehicle
+from rotorfault.pages.flight_page import page
 
 
 def test_a_page_has_the_verdict_and_the_evidence_against_each_rotor(tmp_path: Path) -> None:
@@ -26,6 +27,14 @@ def test_a_page_has_the_verdict_and_the_evidence_against_each_rotor(tmp_path: Pa
     assert "evidence_against_rotors" in text
     assert found.probable.evidence in text  # whole, however long
     assert "desired path" not in text  # a log has none, so nothing is drawn that would need a legend
+
+
+def test_a_vehicle_is_drawn_without_panels_of_thrusts_that_no_log_has() -> None:
+    found = diagnosis_of(log_of(flown(seed=1, seconds=8.0)))
+    text = page([shown(found, file=load_vehicle("x500"))])
+    assert "rotor rings: blue turns clockwise" in text
+    for heading in ("Rotors", "Attainable set"):
+        assert f"<section hidden><h2>{heading}</h2>" in text
 
 
 def test_belief_follows_evidence_and_both_begin_with_the_loss() -> None:

@@ -94,14 +94,14 @@ def speed(steps_per_s: float, cores: int) -> dict[str, float]:
 
 
 def measure_batches(cores: int, quick: bool, say: Say) -> dict[str, Any]:
-    """Batches of `SIZES`, each on one core and on all, some 20 million steps a call (quick: 5)."""
+    """Batches of `SIZES`, some 20 million steps a call (quick: 5): on one core by its own time, and on all."""
     speeds: dict[str, Any] = {}
     repeats, steps = (3, 5e6) if quick else (7, 2e7)
     for size in SIZES:
         duration = float(np.clip(round(steps / size * PERIOD, 1), 0.2, 20.0))
         say(f"batch of {size:,}: {duration:g} s each")
         batch = batch_of(size, duration)
-        one = speed(timed(batch, 1, repeats), 1)
+        one = speed(timed(batch, 1, repeats, time.thread_time), 1)
         speeds[str(size)] = one | {"flight_seconds": duration}
         if cores > 1:
             together = timed(batch, cores, repeats)
@@ -149,7 +149,10 @@ def measure_noise(quick: bool, say: Say) -> dict[str, Any]:
         "gusts": {"wind.kind": "dryden"},
         "noise_and_gusts": {"sensors.kind": "noisy", "wind.kind": "dryden"},
     }
-    speeds = {name: timed(batch_of(1_000, duration, **calm, **case), 1, repeats) for name, case in cases.items()}
+    speeds = {
+        name: timed(batch_of(1_000, duration, **calm, **case), 1, repeats, time.thread_time)
+        for name, case in cases.items()
+    }
     return {
         name: {"steps_per_s_per_core": value, "cost_factor": speeds["without"] / value}
         for name, value in speeds.items()

@@ -90,6 +90,7 @@ def page(flights: Sequence[Shown]) -> str:
         records=[_provenance(flight) for flight in flights],
         spins=any(flight["spins"] for flight in payload["flights"]),
         rotors=any(flight["vehicle"] is not None for flight in payload["flights"]),
+        thrusts=any(flight["vehicle"] is not None and "thrust" in flight["signals"] for flight in payload["flights"]),
         logged=all("logged" in flight.data.attrs for flight in flights),
         thinned=_thinned(payload),
         data=script_data(payload),

@@ -19,6 +19,8 @@ SHORT = 8  # characters of a column's name that fits above its neighbour's
 MOST_FIELDS = 24  # beside each other with letters of the usual size
 DARK = 0.6  # share from which on a field is too dark for black letters
 LEAST_RATE = 0.01  # per hour: below it the scale is linear
+MARKERS = "os^Dv"  # a line each, so that colour alone tells nothing
+APART = 1.025  # between the same times of two lines on a scale of logarithms, so that no bar hides another
 SCALE = ("#F2E6D0", "#9CC9E2", "#0072B2")  # sand to blue: apart for everybody, and in grey
 
 
@@ -76,10 +78,10 @@ def _lines(one: Curves) -> Figure:
     figure = new_figure(8.5)
     axes = figure.subplots()
     for k, (label, (x, y, lower, upper)) in enumerate(one.lines.items()):
-        style = look(k)
+        apart = APART ** (k - 0.5 * (len(one.lines) - 1)) if one.x_log else 1.0
         axes.errorbar(
-            x, y, [np.maximum(y - lower, 0.0), np.maximum(upper - y, 0.0)], marker="o", markersize=3.0, capsize=2.0,
-            elinewidth=0.7, label=shown(label, MOST_LABEL), **style,
+            x * apart, y, [np.maximum(y - lower, 0.0), np.maximum(upper - y, 0.0)], marker=MARKERS[k % len(MARKERS)],
+            markersize=3.0, capsize=2.0, elinewidth=0.7, label=shown(label, MOST_LABEL), **look(k),
         )  # fmt: skip
     if one.ideal is not None:
         label, ideal = one.ideal
