@@ -38,6 +38,15 @@ function joined(flights) {
   return { time, records };
 }
 
+/** Width in px that an upright axis takes: what its longest number needs, its minus sign included. */
+function room(u, numbers, k, cycle) {
+  const axis = u.axes[k];
+  const least = cycle > 1 ? axis._size : 52; // it only grows while it is laid out, so that it settles
+  u.ctx.font = axis.font[0];
+  const widest = Math.max(0, ...(numbers ?? []).map((text) => u.ctx.measureText(text).width / devicePixelRatio));
+  return Math.max(least, Math.ceil(widest + axis.ticks.size + axis.gap + 4));
+}
+
 /** Values of a column over the joined times; undefined where the flight has no record then, null for a gap. */
 function valuesOn(flight, curve, grid, index) {
   const signal = flight.signals[curve.signal];
@@ -197,7 +206,7 @@ export class Plots {
       legend: { show: false },
       cursor: { drag: { x: false, y: false }, x: false, y: false, points: { show: false } },
       scales: { x: { time: false, min: this.window[0], max: this.window[1] }, y: { range: (u, low, high) => this.range(card, low, high) } },
-      axes: [{ ...axis, size: 26, values: (u, ticks) => ticks.map((t) => `${shown(t, 6).replace(/\.?0+$/, '')}`), space: 60 }, { ...axis, size: 52, space: 26, values: (u, ticks) => ticks.map((t) => ticked(t, ticks)) }],
+      axes: [{ ...axis, size: 26, values: (u, ticks) => ticks.map((t) => `${shown(t, 6).replace(/\.?0+$/, '')}`), space: 60 }, { ...axis, size: room, space: 26, values: (u, ticks) => ticks.map((t) => ticked(t, ticks)) }],
       series: [{}, ...curves.map((curve) => ({ stroke: curve.look.stroke, width: curve.look.width, dash: curve.look.dash, points: { show: false }, spanGaps: true }))],
       hooks: { drawClear: [(u) => this.behind(u, card)] },
     };
