@@ -1,6 +1,7 @@
 """The same flights by every controller: a rotor lost, two opposite ones, a partial loss, and sound rotors that track.
 
-    python benchmarks/opponents.py [--flights 100] [--only VEHICLE ...] [--cases CASE ...] [--json FILE]
+    python benchmarks/opponents.py [--flights 100] [--first-seed 0] [--only VEHICLE ...] [--cases CASE ...]
+                                   [--laws LAW ...] [--json FILE]
 
 Hover at 10 m, or a circle of 2 m at a rad/s (`tracking`), in wind of 5 m/s with gusts (Dryden, 5 m/s at 6 m) and with
 noisy sensors; rotors stop, or lose 40 %, at 1 s; 15 s. Controllers that are told of faults have the Luenberger
@@ -8,9 +9,9 @@ observer in the loop; those that are not fly without a diagnosis. Every controll
 found for it with the same budget, on `hummingbird`: `hummingbird` for flights that hold yaw, `spin` for total losses,
 where it has one. Nothing was searched on another vehicle: `mueller-2014` and `hitsz` show what gains are worth there.
 
-Seeds are the same for all, so each is compared with ROISMC pair by pair: Tango's interval of the difference of
-survival, and the median difference of the tracking error with a bootstrapped interval. Operations are those of a step
-of the whole quiet loop (`benchmarks/operations.py`), on a quadrotor.
+Seeds are the same for all, so each is compared with ROISMC pair by pair: Tango's interval of the differences of
+survival and of being within 2 m, and the median differences of height lost and of the tracking error with intervals
+of a bootstrap. Operations are those of a step of the whole quiet loop (`benchmarks/operations.py`), on a quadrotor.
 """
 
 from __future__ import annotations
@@ -36,7 +37,12 @@ OURS = "roismc"
 UNTOLD = ("pid_cascade", "geometric_adaptive", "uniform_passive")
 KINDS = (OURS, "smc", "indi", "ndi_primary_axis", "lqr_relaxed_hover", "pid_cascade", "geometric", *UNTOLD[1:])
 VEHICLES = ("hummingbird", "mueller-2014", "hitsz")
-FLIGHTS = ("one", "opposite", "partial", "tracking")
+FLIGHTS = {
+    "one": "One rotor lost",
+    "opposite": "Two opposite rotors lost",
+    "partial": "A rotor loses 40 %",
+    "tracking": "Sound rotors, tracking",
+}
 NEAR = 2.0  # m
 DRAWS = 2000  # of the bootstrap
 CIRCLE = {
@@ -62,9 +68,9 @@ def flight(vehicle: str, case: str, kind: str) -> dict[str, Any]:
     return chosen
 
 
-def flown(vehicle: str, case: str, kind: str, flights: int) -> dict[str, Array]:
-    """Numbers of each flight of a row."""
-    table = rf.fly_many("hover-fault", {"seed": np.arange(flights)}, settings=flight(vehicle, case, kind)).table
+def flown(chosen: dict[str, Any], seeds: Array) -> dict[str, Array]:
+    """Numbers of each flight of these settings."""
+    table = rf.fly_many("hover-fault", {"seed": seeds}, settings=chosen).table
     end = sum(np.asarray(table[f"position_error_end.{axis}"], dtype=float) ** 2 for axis in "xyz")
     survived = np.asarray(table["survived"], dtype=bool)
     return {
@@ -74,17 +80,20 @@ def flown(vehicle: str, case: str, kind: str, flights: int) -> dict[str, Array]:
     }
 
 
-def compared(one: dict[str, Array], ours: dict[str, Array]) -> dict[str, Any]:
-    """A controller against ours, pair by pair."""
-    a, b = one["survived"], ours["survived"]
-    difference = paired_difference(int((a & ~b).sum()), int((b & ~a).sum()), len(a))
-    found: dict[str, Any] = {"survival": [float(x) for x in difference]}
-    both = a & b
-    if both.sum() > 1:
-        gap = (one["late_position_rms"] - ours["late_position_rms"])[both]
-        draws = np.random.Generator(np.random.Philox(1)).integers(len(gap), size=(DRAWS, len(gap)))
-        low, high = np.quantile(np.median(gap[draws], axis=1), (0.025, 0.975))
-        found["error"] = [float(np.median(gap)), float(low), float(high)]
+def compared(one: dict[str, Array], ours: dict[str, Array]) -> dict[str, list[float]]:
+    """A controller less ours, pair by pair, each difference with its interval."""
+    found: dict[str, list[float]] = {}
+    for key in ("survived", "near"):
+        a, b = one[key], ours[key]
+        found[key] = [float(x) for x in paired_difference(int((a & ~b).sum()), int((b & ~a).sum()), len(a))]
+    both = one["survived"] & ours["survived"]
+    for key in ("altitude_lost", "late_position_rms"):
+        gap = (one[key] - ours[key])[both]
+        gap = gap[np.isfinite(gap)]
+        if len(gap) > 1:
+            draws = np.random.Generator(np.random.Philox(1)).integers(len(gap), size=(DRAWS, len(gap)))
+            low, high = np.quantile(np.median(gap[draws], axis=1), (0.025, 0.975))
+            found[key] = [float(np.median(gap)), float(low), float(high)]
     return found
 
 
@@ -123,40 +132,51 @@ def line(one: dict[str, Any]) -> str:
     def number(key: str, digits: int = 2) -> str:
         return "-" if one[key] is None else f"{one[key]:.{digits}f}"
 
-    against = one["against_ours"]
-    gap = "" if one["controller"] == OURS else "{:+.2f} ({:+.2f}, {:+.2f})".format(*against["survival"])
-    error = (
-        ""
-        if one["controller"] == OURS or "error" not in against
-        else "{:+.2f} ({:+.2f}, {:+.2f})".format(*against["error"])
-    )
-    lost = "" if one["case"] == "tracking" else f"{number('height_lost_median')}, {number('height_lost_p95')}"
-    return (
-        f"| `{one['vehicle']}` | {one['case']} | `{one['controller']}` | {one['survived']} | {one['within_2m']} "
-        f"| {lost} | {number('late_position_rms_median')} | {number('cost_median', 1)} | {gap} | {error} |"
-    )
+    def gap(key: str) -> str:
+        known = one["controller"] != OURS and key in one["against_ours"]
+        return "{:+.2f} ({:+.2f}, {:+.2f})".format(*one["against_ours"][key]) if known else ""
+
+    tracks = one["case"] == "tracking"
+    lost = f"{number('height_lost_median')}, {number('height_lost_p95')}" if one["survived"] else "-"
+    cells = [
+        f"`{one['vehicle']}`",
+        f"`{one['controller']}`",
+        str(one["survived"]),
+        str(one["within_2m"]),
+        "" if tracks else lost,
+        number("late_position_rms_median"),
+        number("cost_median", 1),
+        gap("survived"),
+        gap("near"),
+        "" if tracks else gap("altitude_lost"),
+        gap("late_position_rms"),
+    ]
+    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
     """Fly and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=100)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--only", nargs="+", choices=VEHICLES, default=list(VEHICLES))
     parser.add_argument("--cases", nargs="+", choices=FLIGHTS, default=list(FLIGHTS))
+    parser.add_argument("--laws", nargs="+", choices=KINDS, default=list(KINDS), help="beside ROISMC")
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
     counts = {kind: operations(loaded("hover-fault", {"controller.kind": kind}), False).total() for kind in KINDS}
     print("operations of a step: " + ", ".join(f"{kind} {count:,d}" for kind, count in counts.items()))
-    rows = []
-    print(
-        f"\n| vehicle | case | controller | survived of {asked.flights} | within 2 m | height lost [m]: median, 95 % "
-        "| late error [m] | cost J | survival less ours | error less ours [m] |\n|" + " --- |" * 10
-    )
-    for vehicle in asked.only:
-        for case in asked.cases:
-            ours = flown(vehicle, case, OURS, asked.flights)
-            for kind in KINDS:
-                numbers = ours if kind == OURS else flown(vehicle, case, kind, asked.flights)
+    seeds, rows = np.arange(asked.first_seed, asked.first_seed + asked.flights), []
+    for case in asked.cases:
+        print(
+            f"\n## {FLIGHTS[case]}\n\n| vehicle | controller | survived of {asked.flights} | within 2 m "
+            "| height lost [m]: median, 95 % | late error [m] | cost J | survival less ROISMC's | within 2 m less "
+            "ROISMC's | height lost less ROISMC's [m] | error less ROISMC's [m] |\n|" + " --- |" * 11
+        )
+        for vehicle in asked.only:
+            ours = flown(flight(vehicle, case, OURS), seeds)
+            for kind in (OURS, *(kind for kind in KINDS[1:] if kind in asked.laws)):
+                numbers = ours if kind == OURS else flown(flight(vehicle, case, kind), seeds)
                 rows.append(row(vehicle, case, kind, numbers, ours))
                 print(line(rows[-1]), flush=True)
     if asked.json:
