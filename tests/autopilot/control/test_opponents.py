@@ -205,9 +205,7 @@ def test_a_law_that_is_told_nothing_flies_on_too(dead: tuple[int, ...]) -> None:
 
 @needs_simd
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize(
-    "kind", ["indi", "lqr_relaxed_hover"]
-)  # that of ndi_primary_axis does in half of the flights
+@pytest.mark.parametrize("kind", ["indi", "lqr_relaxed_hover", "ndi_primary_axis"])
 def test_its_preset_for_total_losses_flies_slow_rotors(kind: str) -> None:
     drag = {"vehicle.air.rotor_drag": {"value": 1.19e-4, "unit": "kg/rad", "source": "RotorPy's parameters"}}
     slow = {"vehicle": "hummingbird", "controller.preset": "spin", "vehicle.linear_drag.value": 0.0, **drag}
