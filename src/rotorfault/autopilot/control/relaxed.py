@@ -124,6 +124,7 @@ class RelaxedAxis(NamedTuple):
     given_up: Scalar  # 0 to 1: share of yaw
     free: Scalar  # 0 to 1: share of it that is not even braked
     thrust: Scalar  # N: most that the believed rotors give together in the balance of the axis
+    spins_up: Scalar  # N m: yaw torque of the rotors then
     to_B: Mat3  # from the frame with n for its z axis to the body's
     turn: Quat  # the same
 
@@ -195,6 +196,7 @@ def relaxed_axis(
     given_up = maximum(free, yaw_given_up(vehicle, 2.0 * weight - with_yaw.least))
     most, balance = spinning_thrust(vehicle, believed, parameters.reserve)
     tau = wrench_of(vehicle, balance).torque_B
+    spins_up = tau.z * (most / weight)
     wanted = lean_in_balance(vehicle, tau, omega_B.z, residual_speed, parameters.lean) * given_up
     size = sqrt(wanted.x * wanted.x + wanted.y * wanted.y + 1e-18)
     wanted = wanted * minimum(parameters.lean / size, 1.0)
@@ -211,7 +213,7 @@ def relaxed_axis(
         -x, -y, z,
     )  # fmt: skip
     turn = Quat(w, -y * half, x * half, 0.0)
-    return RelaxedAxis(memory._replace(lean=lean), given_up, free, most, to_B, turn)
+    return RelaxedAxis(memory._replace(lean=lean), given_up, free, most, spins_up, to_B, turn)
 
 
 def yaw_given_up(vehicle: Vehicle, with_yaw: Scalar) -> Scalar:

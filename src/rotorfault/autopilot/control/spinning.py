@@ -18,7 +18,7 @@ from rotorfault.autopilot.control.relaxed import (
     relaxed_torque,
 )
 from rotorfault.autopilot.control.steady_force import observed, unexplained
-from rotorfault.autopilot.control.tumbling import without_haste
+from rotorfault.autopilot.control.tumbling import Tumble, without_haste
 from rotorfault.maths.geometry import Mat3, Vec3
 from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum, sqrt
 from rotorfault.model.motion import drag_acceleration, mean_bandwidth
@@ -179,7 +179,9 @@ class Spinning:
         after, torque_B = relaxed_torque(
             self.axis, self._error, given.torque_B, switching_B, vehicle, residual_speed, self.parameters
         )
-        hastes = without_haste(torque_B, inputs.estimate.omega_B, vehicle, inputs.diagnosis, residual_speed)
+        up_B = Vec3(R_WB.zx, R_WB.zy, R_WB.zz)
+        tumble = Tumble(inputs.estimate.omega_B, up_B, given.torque_B, self.axis.spins_up, residual_speed)
+        hastes = without_haste(torque_B, tumble, vehicle, inputs.diagnosis)
         torque_B = torque_B + (hastes - torque_B) * self.axis.free
         # The rotors' thrust points up by the cosine of the tilt only; upside down it is for torque alone.
         weight = vehicle.mass * vehicle.gravity
