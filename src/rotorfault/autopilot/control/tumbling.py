@@ -131,7 +131,8 @@ def _turn_upright(up_B: Vec3) -> Vec3:
     """The shortest turn upright in rad, body axes."""
     # The small term keeps the quotient a number upright.
     size = sqrt(up_B.x * up_B.x + up_B.y * up_B.y + 1e-12)
-    return Vec3(-up_B.y, up_B.x, 0.0) * (atan2(size, up_B.z) / size)
+    turn: Vec3 = Vec3(-up_B.y, up_B.x, 0.0) * (atan2(size, up_B.z) / size)
+    return turn
 
 
 def _stopped(roll: PerRotor, pitch: PerRotor, able: PerRotor, d: Vec3) -> Scalar:
