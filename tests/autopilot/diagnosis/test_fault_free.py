@@ -112,7 +112,7 @@ def test_a_wrong_model_goes_no_further_than_one_can_be() -> None:
     mean = [0.0] * n
     mean[fault_free.INERTIA], mean[fault_free.BANDWIDTH], mean[fault_free.MASS] = -1.9, 2.3, 0.2
     held = fault_free.within_bounds(diagonal(mean, [1.0] * n))
-    assert held.mean[fault_free.INERTIA] == -fault_free.MOST_INERTIA
+    assert held.mean[fault_free.INERTIA] == -fault_free.MOST_WRONG
     assert held.mean[fault_free.BANDWIDTH] == 1.0
     assert held.mean[fault_free.MASS] == 0.2
     assert held.covariance == diagonal(mean, [1.0] * n).covariance

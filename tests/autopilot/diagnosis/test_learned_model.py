@@ -109,6 +109,25 @@ def test_what_a_wrong_inertia_changes_is_the_derivative_of_the_motion(axis: int)
     assert max(map(abs, row)) > 1e-3
 
 
+def test_air_that_is_felt_turns_a_lighter_body_by_less() -> None:
+    """The plant's torque about yaw on a body lighter than believed, whose accelerometer tells force over mass."""
+    shift, believed = (0.006, -0.004, 0.0), crazyflie()
+    true = believed._replace(
+        mass=0.9 * believed.mass, rotor_x=believed.rotor_x - shift[0], rotor_y=believed.rotor_y - shift[1]
+    )
+    force, torque = air_wrench(true.air, rotor_places(true), SPEEDS, Vec3(7.0, -4.0, 0.0), zeros())  # type: ignore[arg-type]
+    # An offset is what the believed weight turns about the centre of mass: that of the believed hover.
+    m, g, J = believed.mass, believed.gravity, believed.inertia
+    offsets = (-shift[1] * m * g / J.x, shift[0] * m * g / J.y)
+    level, felt = (Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0)), force / true.mass
+    blown, same = (
+        blown_about(believed, believed, SPEEDS, felt, level, ((0.0, 0.0), offsets), 1.0, T, heavier)
+        for heavier in (0.9, 1.0)
+    )
+    assert blown.yaw + sum(blown.beside) == pytest.approx(T * torque.z / J.z, rel=1e-9)
+    assert same.yaw + sum(same.beside) == pytest.approx(T * torque.z / J.z / 0.9, rel=1e-9)
+
+
 def test_wind_turns_a_body_whose_levers_are_known_as_the_drag_of_its_rotors_does() -> None:
     """The plant's torque of all rotors in a wind, about a centre of mass that is known to lie elsewhere."""
     shift, vehicle = (0.006, -0.004, 0.007), crazyflie()

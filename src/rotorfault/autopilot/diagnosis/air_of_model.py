@@ -7,7 +7,9 @@ and attacks at the mean of their places by speed, beside which the centre of mas
 tell,
 
 .. math:: \dot\omega_z \mathrel{+}= \tfrac{\beta m}{J_z}(\bar xf_y - \bar yf_x)
-                                    - \tfrac{\beta}{gJ_z}(J_xf_xd_x + J_yf_yd_y)
+                                    - \tfrac{\beta}{gJ_z}(J_xf_xd_x + J_yf_yd_y) ,
+
+with f, which is felt, the force over mass: on a mass that is learned to be another all of it goes with that mass.
 """
 
 from __future__ import annotations
@@ -173,11 +175,13 @@ def blown_about(
     arms: tuple[Sequence[Scalar], Sequence[Scalar]],
     share: Scalar,
     dt: Scalar,
+    heavier: Scalar = 1.0,
 ) -> Blown:
     """What the air changes the rates by.
 
     Levers are learned as what they turn a body of the believed inertia by; where drag of the rotors attacks is known,
-    so that turns the body as its learned inertia has it.
+    so that turns the body as its learned inertia has it, with the force of the air on its learned mass: known is that
+    force over mass, for that is felt.
 
     Parameters
     ----------
@@ -194,7 +198,10 @@ def blown_about(
         Of drag that acts at the rotors.
     dt : scalar, s
         Length of the period.
+    heavier : scalar
+        The learned mass over the believed one.
     """
+    share = share * heavier
     forward, left = air_W.dot(level_W[0]), air_W.dot(level_W[1])
     roll, pitch = lever_rows(believed, forward, left)
     each = [arm * one for arm, one in zip(arms[0], lever_rows(believed, 1.0, 1.0), strict=True)]

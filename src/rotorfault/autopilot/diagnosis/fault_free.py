@@ -67,9 +67,9 @@ from rotorfault.model.vehicle import Vehicle, over_inertia, rotor_speeds, wrench
 
 RATES, OFFSETS, INERTIA, BANDWIDTH, LEVERS, WIND, MASS, LOSSES = 0, 3, 6, 9, 10, 12, 15, 16
 """Places of the states: three rates, three offsets, three inertias, bandwidth, two levers, wind, mass, losses."""
-LEARNED = (BANDWIDTH, *range(INERTIA, INERTIA + 3), *range(WIND, WIND + 3))  # what is in the model already
+LEARNED = (BANDWIDTH, *range(INERTIA, INERTIA + 3), *range(WIND, WIND + 3), MASS)  # what is in the model already
 
-MOST_INERTIA = 0.5  # of the logarithm of a true inertia over the believed one: more is no wrong model
+MOST_WRONG = 0.5  # of the logarithm of a true inertia over the believed one, and of e_m: more is no wrong model
 TINY = 1e-12  # variance of a loss below which it is known
 BLIND = 1e6  # m^2/s^4: variance of a specific force that nobody measures
 SAG = 600.0  # s: in which a battery weakens the rotors by as much as the mass is uncertain; about as long as it lasts
@@ -263,7 +263,8 @@ def advance(
     more = air_of_model.more_drag(e.speed, p.turning, p.at_rotors) if vehicle.air != () else 1.0
     air_W = Vec3.of(mean[WIND : WIND + 3]) * more
     arms = (mean[LEVERS : LEVERS + 2], mean[OFFSETS : OFFSETS + 2])
-    blown = air_of_model.blown_about(believed, vehicle, e.speed, air_W, level_W, arms, p.at_rotors, dt)
+    heavier = 1.0 / (1.0 - mean[MASS])
+    blown = air_of_model.blown_about(believed, vehicle, e.speed, air_W, level_W, arms, p.at_rotors, dt, heavier)
     weigh = (wrench.thrust - less_thrust) / weight
 
     beyond: Scalar = 0.0
@@ -292,10 +293,10 @@ def advance(
         by_inertia = inertia_row(vehicle, axis, turned, omega_B * dt, omega_B, blown.beside)
         row |= {INERTIA + k: x for k, x in enumerate(by_inertia)}
         row |= {WIND + k: x * more for one in blown.wind[axis : axis + 1] for k, x in enumerate(one)}
+        row |= {MASS: (blown.yaw + sum(blown.beside)) * heavier} if axis == 2 and blown.offsets else {}
         # What is learned of them is in the model already; what the wind turns, in the rows of levers and offsets.
-        known[RATES + axis] = (
-            getattr(change, name) + twice - dot({k: x for k, x in row.items() if k in LEARNED}, mean)
-        )
+        learned = dot({k: x for k, x in row.items() if k in LEARNED}, mean)
+        known[RATES + axis] = getattr(change, name) + twice - learned
         row |= {LEVERS + axis: blown.levers[axis]} if axis < 2 else dict(enumerate(blown.offsets, OFFSETS))
         rows[RATES + axis] = row
         noise[RATES + axis] = (getattr(wrong, name) + getattr(push, name)) * dt + unknown
@@ -364,15 +365,15 @@ def advance(
 
 
 def within_bounds(belief: Belief) -> Belief:
-    """A state whose inertia and bandwidth are what a wrong model can be; beyond, nothing might bring them back.
+    """A state whose inertia, mass and bandwidth a wrong model can have; beyond, nothing might bring them back.
 
     Parameters
     ----------
     belief : Belief
     """
     mean = list(belief.mean)
-    for k in (INERTIA, INERTIA + 1, INERTIA + 2):
-        mean[k] = clip(mean[k], -MOST_INERTIA, MOST_INERTIA)
+    for k in (INERTIA, INERTIA + 1, INERTIA + 2, MASS):
+        mean[k] = clip(mean[k], -MOST_WRONG, MOST_WRONG)
     mean[BANDWIDTH] = clip(mean[BANDWIDTH], -learned_lag.MOST, learned_lag.MOST)
     return belief._replace(mean=tuple(mean))
 
