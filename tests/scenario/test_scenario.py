@@ -70,7 +70,7 @@ def test_parts_are_had_by_slot_and_by_name() -> None:
         ({"duration": True}, "duration: got true; allowed: a number"),
         ({"duration": math.nan}, "duration: .*finite"),
         ({"seed": -1}, "seed: .*greater than or equal to 0; got -1"),
-        ({"seed": 1.5}, r"seed: .*integer.*; got 1\.5"),
+        ({"seed": 1.5}, r"seed: must be a whole number; got 1\.5"),
         (
             {"start": {"position": [0.0, 0.0]}},
             r"start\.position, entry 3: is missing.*\(key start\.position\.2\)",
