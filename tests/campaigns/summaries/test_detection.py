@@ -247,6 +247,26 @@ def test_with_and_without_speeds_are_two_lines_of_the_roc(flown: Path) -> None:
 
 
 @needs_simd
+def test_with_and_without_speeds_stand_beside_each_other_at_one_threshold(flown: Path) -> None:
+    table = pl.read_parquet(flown / "flights.parquet").filter(pl.col("variant") == "as it is")
+    later = {"kind": "luenberger", "decision": {"threshold": 0.35, "clear_threshold": 0.2}}
+    speeds = {"sensors": {"kind": "mocap", "rotor_speeds": {"on": True}}}
+    off = {"diagnosis": {"kind": "luenberger"}, "sensors": {"kind": "mocap"}}
+    settings = {
+        "off": off,
+        "on": off | speeds,
+        "later": off | {"diagnosis": later},
+        "later, on": off | speeds | {"diagnosis": later},
+    }
+    variants = [{"label": label, "settings": one} for label, one in settings.items()]
+    of_all = pl.concat([table.with_columns(variant=pl.lit(label)) for label in settings])
+    page = detection(study_from(DETECTION | {"variant": variants}, "study"), of_all.to_arrow()).tables
+    (beside,) = [one for one in page if one.title == "Detectors on the same flights"]
+    pairs = {(row[1], row[2]) for row in beside.rows}
+    assert pairs == {("off", "on"), ("off", "later"), ("off", "later, on"), ("later", "later, on")}
+
+
+@needs_simd
 def test_isolation_of_a_detector_that_is_foreseen_is_its_own(flown: Path) -> None:
     """The same table read as if `glr` had flown: predicted shares follow its windows, what was measured stays."""
     table = pl.read_parquet(flown / "flights.parquet").to_arrow()

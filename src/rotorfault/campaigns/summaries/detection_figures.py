@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rotorfault.autopilot.diagnosis import DIAGNOSIS
 from rotorfault.campaigns.summaries.paired import paired_table
 from rotorfault.campaigns.summaries.parts import (
     NAMED,
@@ -70,14 +71,18 @@ def figures(flights: Flights, of_first: Column, content: Row) -> tuple[Shares | 
 
 def _pairs(flights: Flights) -> set[tuple[str, str]]:
     """Variants that are shown beside each other: the first and each other, and with rotor speeds and without."""
-    said = {one.variant: one for one in flights.kind}
-    names = list(said)
+    first_of = {one.variant: k for k, one in reversed(list(enumerate(flights.kind)))}
+    names = list(dict.fromkeys(one.variant for one in flights.kind))
     with_first = {(names[0], other) for other in names[1:]}
-    alike = {name: (said[name].detector, said[name].wanted) for name in names}
+    # One detector with one threshold.
+    alike = {
+        name: (flights.kind[k].detector, flights.scenarios[k][DIAGNOSIS].settings) for name, k in first_of.items()
+    }
+    speeds = {name: flights.kind[k].speeds for name, k in first_of.items()}
     return with_first | {
         (one, other)
         for one, other in combinations(names, 2)
-        if alike[one] == alike[other] and said[one].speeds != said[other].speeds
+        if alike[one] == alike[other] and speeds[one] != speeds[other]
     }
 
 
