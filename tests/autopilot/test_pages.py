@@ -279,12 +279,13 @@ def test_the_belief_is_that_of_the_page(flight: Flight) -> None:
         shown = np.minimum(F[i] / hover, 1) ** 2
         below = np.where(np.abs(off) < s.clear_threshold * np.maximum(F[i], hover), below + elapsed * shown, 0)
         cleared = (below >= s.clear_persistence - T / 2) & ~raised
-        margin = np.maximum(threshold[i] / np.maximum(late, limit) - s.threshold, 0)
+        margin = threshold[i] / np.maximum(late, limit)
         gap = loss - smoothed
         open_ = np.clip(gap, -margin, margin)
-        followed = smoothed + blend * (gap - open_ + shown * open_)
+        followed = loss - (1 - blend * shown) * open_
         first = (flags == 0) & (since <= 1.5 * T)
-        smoothed = np.where(first, np.maximum(loss - margin, 0), followed)
+        begins = np.maximum(loss - np.maximum(margin - s.threshold, 0), 0)
+        smoothed = np.where(first, begins, followed)
         flags = np.where(raised, 1, np.where(cleared, 0, flags))
         flagged.append(flags)
         believed.append(smoothed * flags)

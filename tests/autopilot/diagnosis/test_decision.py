@@ -279,7 +279,7 @@ def test_no_rotor_is_cleared_while_its_thrust_shows_nothing() -> None:
 def test_smoothing_is_first_order_from_the_first_suspicion() -> None:
     parameters = numbers()
     memory, believed = undecided(), []
-    losses = [0.5] * 8 + [0.3] * 60
+    losses = [0.5] * 8 + [0.45] * 60
     for loss in losses:
         residual = PerRotor(-loss * HOVER, 0.0, 0.0, 0.0)
         memory, told = step(memory, residual, PerRotor.all(HOVER), parameters, T)
@@ -287,10 +287,24 @@ def test_smoothing_is_first_order_from_the_first_suspicion() -> None:
     assert believed[:7] == [0.0] * 7  # not flagged yet: nothing is believed
     assert believed[7] == pytest.approx(0.5)
     k = np.arange(1, 61)
-    np.testing.assert_allclose(believed[8:], 0.3 + 0.2 * np.exp(-k * T / 0.025), atol=1e-12)
+    np.testing.assert_allclose(believed[8:], 0.45 + 0.05 * np.exp(-k * T / 0.025), atol=1e-12)
     none = DecisionParameters(*parameters)._replace(smoothing=0.0)
     _, told = step(memory, PerRotor(-0.4 * HOVER, 0.0, 0.0, 0.0), PerRotor.all(HOVER), none, T)
     assert told.loss.r1 == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("after", "threshold"), [(0.9, 0.1), (0.3, 0.1)])
+def test_what_is_farther_off_than_the_threshold_is_believed_at_once(after: float, threshold: float) -> None:
+    """Neither noise nor a wrong model shows so much; the rest comes with the smoothing."""
+    parameters, (memory, _) = numbers(), run(undecided(), 0.6, HOVER, 300)
+    believed = []
+    for _ in range(60):
+        residual = PerRotor(-after * HOVER, 0.0, 0.0, 0.0)
+        memory, told = step(memory, residual, PerRotor.all(HOVER), parameters, T)
+        believed.append(told.loss.r1)
+    side = math.copysign(threshold, 0.6 - after)
+    k = np.arange(1, 61)
+    np.testing.assert_allclose(believed, after + side * np.exp(-k * T / 0.025), atol=1e-9)
 
 
 def test_thresholds_out_of_order_are_refused() -> None:

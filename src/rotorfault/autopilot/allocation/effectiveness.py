@@ -37,7 +37,7 @@ from pydantic import Field
 
 from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.nearest import limits_of, nearest
-from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
+from rotorfault.autopilot.allocation.protocol import LEAST_EFFECTIVENESS, AllocationInputs, Allocator
 from rotorfault.base.config import Strict
 from rotorfault.maths.geometry import PerRotor, per_rotor, spread
 from rotorfault.maths.records import select_record
@@ -68,7 +68,10 @@ class Effectiveness(Allocator[Nothing, EffectivenessParameters]):
         """When a rotor counts as dead."""
 
         effectiveness_min: float = Field(
-            default=0.05, gt=0.0, lt=1.0, description="Effectiveness below which a rotor counts as dead [1]"
+            default=LEAST_EFFECTIVENESS,
+            gt=0.0,
+            lt=1.0,
+            description="Effectiveness below which a rotor counts as dead [1]",
         )
 
     def parameters(self, context: Context) -> EffectivenessParameters:

@@ -14,6 +14,9 @@ from rotorfault.model.signals import Allocation, Diagnosis, Wrench
 from rotorfault.model.slot import Slot
 from rotorfault.model.vehicle import Vehicle
 
+# Of a rotor, below which it counts as dead: our choice, a twentieth is as little as detectors tell from nothing.
+LEAST_EFFECTIVENESS = 0.05
+
 
 class AllocationInputs(NamedTuple):
     """All that an allocator may use at one sampling instant."""

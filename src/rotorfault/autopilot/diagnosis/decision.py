@@ -22,11 +22,11 @@ below ``clear_threshold`` for ``clear_persistence``; the time counts as far as i
 
 **Belief.** What is missing shows late, by the mean delay 1/p + 1/q of the observer's poles. So it is compared with a
 thrust as late, :math:`F_i` behind a lag of that time: else a rotor that is told to give more seems to give it.
-With it :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i -
-threshold`, which is 0 in steady hover, and not at all where a sound rotor would give less than 5 % of F_max. The
-believed loss follows it with the time constant ``smoothing`` as far as it lies outside of that margin, and within it
-more slowly, by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too much is flagged with a loss of 0: no
-reallocation makes it give less.
+With it :math:`\lambda_i = \mathrm{clip}((r_s - r_i)/F_i, 0, 1)` is known to within :math:`m_i = T_i/F_i`, and not at
+all where a sound rotor would give less than 5 % of F_max. Farther off than that is neither noise nor a wrong model:
+the believed loss follows at once. Within it there may be either, and it follows with the time constant ``smoothing``,
+with little thrust more slowly by :math:`\min(F_i/F_{hover}, 1)^2`. A rotor that gives too much is flagged with a loss
+of 0: no reallocation makes it give less.
 
 **Test.** A rotor that is believed to have lost more than half may be held where it cannot show that it is sound. So
 it is tested, at once and every ``test_interval``: it gets ``test_thrust`` at least, for as long as lag and observer
@@ -291,13 +291,13 @@ def decide(
         flagged = select(raised, 1.0, select(cleared, 0.0, was.flagged))
 
         # Beyond all bounds where there is too little thrust: what shows nothing changes nothing.
-        margin = select(less(f, least), UNBOUNDED, maximum(threshold * over_f - p.threshold, 0.0))
-        gap = loss - was.smoothed
-        open_ = clip(gap, -margin, margin)
+        margin = select(less(f, least), UNBOUNDED, threshold * over_f)
+        open_ = clip(loss - was.smoothed, -margin, margin)
         # Between suspicion and flag the filter runs already, from the loss seen at the first suspicion.
         fresh = both(negated(was.flagged), less_equal(since, 1.5 * dt))
-        followed = was.smoothed + blend * (gap - open_ + shown * open_)
-        smoothed = select(fresh, maximum(loss - margin, 0.0), followed)
+        followed = loss + (blend * shown - 1.0) * open_
+        first = loss - maximum(margin - p.threshold, 0.0)
+        smoothed = select(fresh, maximum(first, 0.0), followed)
 
         doubted = both(flagged, greater(smoothed, TESTED))
         again = greater_equal(was.tested, p.test_interval)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar, NamedTuple
 
+from rotorfault.autopilot.allocation.protocol import LEAST_EFFECTIVENESS
 from rotorfault.autopilot.instant import Decision, Instant
 from rotorfault.autopilot.prediction import Expectation
 from rotorfault.base.one_line import record_line
-from rotorfault.maths.scalar import Scalar, maximum, minimum
+from rotorfault.maths.scalar import Scalar, greater_equal, maximum, select
 from rotorfault.model.block import Block, MemoryT, ParametersT
 from rotorfault.model.signals import Diagnosis, Estimate, Reference
 from rotorfault.model.slot import Slot
@@ -47,14 +48,17 @@ def counted_upon(loss: Scalar) -> Scalar:
 
     A detector approaches the loss of a dead rotor from below and stays some percent short of it. An autopilot that
     counts upon those percent waits for torque that never comes. From a loss of `NEARLY_DEAD` on what is believed to
-    be left shrinks, to nothing where half of the rest is gone.
+    be left shrinks, to nothing where half of the rest is gone, and what allocation would not ask for counts for
+    nothing: a controller that counts upon it demands a tilt torque that is out of reach, if only just, and in a body
+    that spins tilt that is out of reach yields to thrust.
 
     Parameters
     ----------
     loss : scalar
         Believed, 0 to 1.
     """
-    return minimum(maximum(loss, 2.0 * loss - NEARLY_DEAD), 1.0)
+    counted = maximum(loss, 2.0 * loss - NEARLY_DEAD)
+    return select(greater_equal(counted, 1.0 - LEAST_EFFECTIVENESS), 1.0, counted)
 
 
 def _inputs(instant: Instant) -> ResponseInputs:
