@@ -35,6 +35,7 @@ import math
 from typing import NamedTuple
 
 from rotorfault.autopilot.control.lean import lean_in_balance
+from rotorfault.autopilot.control.rollout import Round, no_round
 from rotorfault.autopilot.control.spin_riccati import (
     Complex,
     Poles,
@@ -115,6 +116,7 @@ class RelaxedMemory(NamedTuple):
     poles: Poles  # of the closed loop
     steady: SteadyForce
     crossover: Scalar  # rad/s: of the position loop, as it was last
+    rounds: Round  # of what is tried while it tumbles
 
 
 class RelaxedAxis(NamedTuple):
@@ -158,7 +160,7 @@ def at_rest(parameters: RelaxedParameters, vehicle: Vehicle, v_W: Vec3) -> Relax
     """The body's z axis, the gain of a body that does not spin, and no steady force at a velocity in m/s."""
     weights = parameters.weights
     poles = optimal(SpinProblem(0.0, 0.0, mean_bandwidth(vehicle), weights.angle, weights.rate))
-    return RelaxedMemory(zeros(), poles, SteadyForce(v_W), 0.0)
+    return RelaxedMemory(zeros(), poles, SteadyForce(v_W), 0.0, no_round())
 
 
 def relaxed_axis(

@@ -16,13 +16,17 @@ from rotorfault.autopilot.control.relaxed import (
     attainable,
     relaxed_axis,
     relaxed_torque,
+    spinning_thrust,
 )
+from rotorfault.autopilot.control.rollout import Able, Motion, Rollout, Round
 from rotorfault.autopilot.control.steady_force import observed, unexplained
 from rotorfault.autopilot.control.tumbling import Tumble, without_haste
 from rotorfault.maths.geometry import Mat3, Vec3
-from rotorfault.maths.scalar import Scalar, absolute, clip, maximum, minimum, sqrt
-from rotorfault.model.motion import drag_acceleration, mean_bandwidth
+from rotorfault.maths.records import select_record
+from rotorfault.maths.scalar import Scalar, absolute, both, clip, greater, maximum, minimum, sqrt
+from rotorfault.model.motion import drag_acceleration, effect_of, mean_bandwidth
 from rotorfault.model.signals import Wrench
+from rotorfault.model.vehicle import wrench_of
 
 # Spin over the rotors' bandwidth from which on the upright law takes over again, at twice that altogether: there
 # rotors that lag give a tenth of a torque that turns with the body, and late by a quarter of a turn.
@@ -199,5 +203,20 @@ class Spinning:
         lifted_W = Vec3(R_WB.xz, R_WB.yz, R_WB.zz) * (given.thrust / vehicle.mass) - Vec3(0.0, 0.0, vehicle.gravity)
         explained_W = lifted_W + drag_acceleration(vehicle, -inputs.estimate.v_W)
         steady = observed(after.steady, self._unexplained_W, explained_W, self.dt)
-        after = after._replace(steady=steady, crossover=self._crossover)
-        return after, Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw))
+        rounds, asked = self._caught(Wrench(thrust, Vec3(tilt_B.x, tilt_B.y, yaw)), tumble, given)
+        return after._replace(steady=steady, crossover=self._crossover, rounds=rounds), asked
+
+    def _caught(self, asked: Wrench, tumble: Tumble, given: Wrench) -> tuple[Round, Wrench]:
+        """Memory of what is tried, and the wrench to ask for: the law's, or that of the push which is flown."""
+        inputs, rounds = self.inputs, self.axis.memory.rounds
+        vehicle, believed, estimate = inputs.vehicle, inputs.diagnosis, inputs.estimate
+        effect = effect_of(vehicle, believed.loss, believed.stuck)
+        most, level = spinning_thrust(vehicle, believed, 0.0)
+        level = level * (most / (vehicle.mass * vehicle.gravity))
+        able = Able(effect * vehicle.thrust_max, level, 1.0 - believed.stuck.effectiveness(believed.loss))
+        rollout = Rollout(vehicle, able, tumble, self.dt)
+        pushes, pushed = rollout.flown(rounds)
+        pushes = both(pushes, greater(self.axis.free, 0.5))
+        held = wrench_of(vehicle, effect * inputs.command)
+        now = Motion(tumble.up_B, tumble.omega_B, given, estimate.v_W.z, estimate.p_W.z)
+        return rollout.after(rounds, now, held), select_record(pushes, pushed, asked)
