@@ -58,6 +58,7 @@ PUSHES = 3
 AHEAD = 0.3
 LEAST_BRAKE = 0.1  # of gravity: keeps the height that stops a fall a number
 TUMBLES = math.sqrt(2.0 * (1.0 - LEAST_COSINE))  # rad: chord of the tilt up to which thrust carries
+FASTEST = 1e3  # rad/s: a step too long for the rate at hand stays a number
 NONE_YET = 1e9  # m: more than any manoeuvre costs
 
 
@@ -226,11 +227,13 @@ class Rollout:
         turned = over_inertia(vehicle, mean_B + torque_of_motion(vehicle, middle_B, residual_speed))
         half = up_B - middle_B.cross(up_B) * (0.5 * length)
         up = up_B - middle_B.cross(half) * length
-        up = up * (1.5 - 0.5 * up.dot(up))
+        # To first order about a unit vector; after a step by more than a radian wholly.
+        square = up.dot(up)
+        up = up * select(less(square, 2.0), 1.5 - 0.5 * square, 1.0 / sqrt(square))
         lifted = (thrust + lacks * kept) * (half.z / vehicle.mass) - vehicle.gravity
         return Motion(
             up,
-            omega_B + turned * length,
+            (omega_B + turned * length).map(lambda rate: clip(rate, -FASTEST, FASTEST)),
             Wrench(thrust + lacks * decay, torque_B + lacks_B * decay),
             motion.climbs + lifted * length,
             motion.height + (motion.climbs + lifted * (0.5 * length)) * length,
