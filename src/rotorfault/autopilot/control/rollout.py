@@ -98,9 +98,8 @@ class _Directions(NamedTuple):
     weak: Vec3  # unit vector: torque this way is lost
     across: Vec3
     reach: Scalar  # N m: torque across, in the sense in which there is less
-    stops: tuple[
-        Scalar, Scalar
-    ]  # rad/s: rates along `weak` and against it that the rotors stop within `STOPS_WITHIN`
+    # rad/s: rates along `weak` and against it that the rotors stop within `STOPS_WITHIN`
+    stops: tuple[Scalar, Scalar]
 
 
 def no_round() -> Round:
