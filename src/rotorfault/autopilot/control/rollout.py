@@ -167,7 +167,10 @@ class Rollout:
                 command = select_record(tries, pushed, command)
             motion = self._moved(motion, command, length)
         ends = greater(rounds.part, PERIODS - 1.5)
-        cost = self._cost(motion) - select(less(rounds.tried, 0.5), AHEAD, 0.0)
+        cost = self._cost(motion)
+        # Where the law itself cannot be predicted nothing stands beside it, and it flies.
+        laws = select(greater(cost, NONE_YET), -NONE_YET, cost - AHEAD)
+        cost = select(less(rounds.tried, 0.5), laws, cost)
         better = both(ends, less(cost, rounds.least))
         least, best = select(better, cost, rounds.least), select(better, rounds.tried, rounds.best)
         over = both(ends, greater(rounds.tried, MANOEUVRES - 1.5))
@@ -226,16 +229,17 @@ class Rollout:
         turned = over_inertia(vehicle, mean_B + torque_of_motion(vehicle, middle_B, residual_speed))
         half = up_B - middle_B.cross(up_B) * (0.5 * length)
         up = up_B - middle_B.cross(half) * length
-        # To first order about a unit vector; after a step by more than a radian wholly.
+        # To first order about a unit vector. A step by more than a radian says nothing: then no push is flown.
         square = up.dot(up)
-        up = up * select(less(square, 2.0), 1.5 - 0.5 * square, 1.0 / sqrt(square))
+        short = less(square, 2.0)
+        up = up * select(short, 1.5 - 0.5 * square, 1.0 / sqrt(square))
         lifted = (thrust + lacks * kept) * (half.z / vehicle.mass) - vehicle.gravity
         return Motion(
             up,
             (omega_B + turned * length).map(lambda rate: clip(rate, -FASTEST, FASTEST)),
             Wrench(thrust + lacks * decay, torque_B + lacks_B * decay),
             motion.climbs + lifted * length,
-            motion.height + (motion.climbs + lifted * (0.5 * length)) * length,
+            select(short, motion.height + (motion.climbs + lifted * (0.5 * length)) * length, -2.0 * NONE_YET),
         )
 
     def _cost(self, motion: Motion) -> Scalar:
@@ -265,10 +269,14 @@ def _directions(vehicle: Vehicle, able: Able, inertia: Scalar) -> _Directions:
     double = [
         (lost * (t.x * t.x - t.y * t.y), lost * 2.0 * t.x * t.y) for lost, t in zip(able.lost, rotors, strict=True)
     ]
-    c, s = sum(x for x, _ in double), sum(y for _, y in double)
-    size = sqrt(c * c + s * s + 1e-12)
-    cosine = sqrt(maximum(0.5 + 0.5 * c / size, 0.0))
-    sine = sqrt(maximum(0.5 - 0.5 * c / size, 0.0)) * select(less(s, 0.0), -1.0, 1.0)
+    # Small terms: where no rotor is lost any direction will do.
+    c, s = sum(x for x, _ in double) + 1e-6, sum(y for _, y in double)
+    size = sqrt(c * c + s * s + 1e-24)
+    # Of half the angle, the larger of sine and cosine first: the other would be a difference of nearly equal numbers.
+    large = sqrt(0.5 + 0.5 * absolute(c) / size)
+    small, beyond = 0.5 * s / (size * large), less(c, 0.0)
+    cosine = select(beyond, absolute(small), large)
+    sine = select(beyond, large * select(less(s, 0.0), -1.0, 1.0), small)
     sense = sum(lost * (t.x * cosine + t.y * sine) for lost, t in zip(able.lost, rotors, strict=True))
     turn = select(less(sense, 0.0), -1.0, 1.0)
     weak, across = Vec3(cosine * turn, sine * turn, 0.0), Vec3(-sine * turn, cosine * turn, 0.0)
