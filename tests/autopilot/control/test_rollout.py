@@ -94,3 +94,14 @@ def test_only_a_body_that_tumbles_is_pushed() -> None:
     assert rollout(spin, UPSIDE_DOWN, 1).flown(chose)[0] == 1.0
     assert rollout(Vec3(8.0, 0.0, 0.0), UPRIGHT, 1).flown(chose)[0] == 1.0
     assert rollout(spin, UPSIDE_DOWN, 1).flown(no_round())[0] == 0.0
+
+
+def test_where_a_step_turns_too_far_to_say_anything_the_law_flies() -> None:
+    """At 80 rad/s a step reaches two radians: no manoeuvre is predicted, the law neither, and none is chosen."""
+    omega = Vec3(80.0, 0.0, 0.0)
+    tried, rounds = rollout(omega, UPSIDE_DOWN, 1), no_round()
+    now = Motion(UPSIDE_DOWN, omega, NOTHING, 0.0, 10.0)
+    for _ in range(MANOEUVRES * PERIODS):
+        rounds = tried.after(rounds, now, NOTHING)
+        assert math.isfinite(rounds.motion.height)
+    assert rounds.chosen == 0.0

@@ -35,7 +35,7 @@ from pydantic import Field
 
 from rotorfault.autopilot.allocation.accounting import account
 from rotorfault.autopilot.allocation.effectiveness import allocated
-from rotorfault.autopilot.allocation.protocol import AllocationInputs, Allocator
+from rotorfault.autopilot.allocation.protocol import LEAST_EFFECTIVENESS, AllocationInputs, Allocator
 from rotorfault.autopilot.diagnosis.fault_free import model_parameters
 from rotorfault.autopilot.diagnosis.model_settings import ModelSettings
 from rotorfault.base.config import Strict
@@ -62,7 +62,10 @@ class DitherSettings(Strict):
     """When a rotor counts as dead, and how soon which loss is to show."""
 
     effectiveness_min: float = Field(
-        default=0.05, gt=0.0, lt=1.0, description="Effectiveness below which a rotor counts as dead [1]"
+        default=LEAST_EFFECTIVENESS,
+        gt=0.0,
+        lt=1.0,
+        description="Effectiveness below which a rotor counts as dead [1]",
     )
     loss: float = Field(default=0.05, gt=0.0, lt=1.0, description="loss that is to show")
     time: float = Field(default=2.0, gt=0.0, description="time after which it is to show [s]")
