@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import warnings
+from collections import Counter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,12 +30,17 @@ class Compiler:
     """Counts compilations."""
 
     def __init__(self, module: Any) -> None:
-        self.count, self._right = 0, module.compile_text
+        self.quickly: list[bool] = []
+        self._right = module.compile_text
 
-    def __call__(self, text: str) -> bytes:
-        self.count += 1
-        code: bytes = self._right(text)
+    def __call__(self, text: str, quickly: bool) -> bytes:
+        self.quickly.append(quickly)
+        code: bytes = self._right(text, quickly)
         return code
+
+    @property
+    def count(self) -> int:
+        return len(self.quickly)
 
 
 @pytest.fixture
@@ -55,6 +61,7 @@ def forget(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(cache, "_KEPT", {})
     monkeypatch.setattr(machine, "_LOADED", {})
+    monkeypatch.setattr(machine, "_FLOWN", Counter())
 
 
 def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -73,7 +80,7 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
         "from rotorfault.flight.assembly import assemble\n"
         "from rotorfault.engine.batch import no_watch\n"
         "from rotorfault.scenario.scenario import scenario_from\n"
-        "def refuse(text): raise SystemExit('compiled again')\n"
+        "def refuse(text, quickly): raise SystemExit('compiled again')\n"
         "native.compile_text = refuse\n"
         f"batch = assemble(scenario_from({short().as_tables()!r}, 'test'))\n"
         "print(load_engine('simd')(batch, no_watch).signals[-1, 0, 0].hex())\n"
@@ -83,6 +90,25 @@ def test_compiled_once(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert float.fromhex(done.stdout) == wanted[-1, 0, 0]
+
+
+def test_few_steps_are_flown_by_code_that_was_made_quickly(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once they have become many it is made well; what is kept so is used from then on, and no bit changes."""
+    from rotorfault.engine import machine
+
+    steps = 1 + len(run(short(), "simd").signals)
+    monkeypatch.setattr(machine, "ENOUGH", 2.5 * steps)
+    forget(monkeypatch)
+    monkeypatch.setattr(cache, "_path", lambda name: None)  # no disk
+    flown = [run(short(), "simd").signals for _ in range(4)]
+    assert compiler.quickly == [True, True, False]  # the first is that of above
+    for again in flown[1:]:
+        np.testing.assert_array_equal(again, flown[0])
+    monkeypatch.setattr(machine, "_FLOWN", Counter())
+    run(short(), "simd")
+    assert compiler.count == 3, "well made, and kept"
 
 
 def test_a_damaged_file_is_replaced(compiler: Compiler, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

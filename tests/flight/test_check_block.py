@@ -144,6 +144,12 @@ def test_parts_are_checked_however_they_are_given(part: Any) -> None:
         assert report.checks[-1].detail == "python engine only, as it says"
 
 
+def test_settings_in_the_place_of_a_controller_are_told_so() -> None:
+    """A dictionary has an `update` too."""
+    with pytest.raises(rf.InputError, match="controller is a dict; settings of a flight are given as settings="):
+        rf.fly("hover-fault", {"duration": 0.1})
+
+
 def test_an_object_is_checked_with_other_settings_than_its_own() -> None:
     with pytest.raises(rf.InputError, match=r"baked into its code: .* acts directly in `step`"):
         rf.check_block(BakedInStep(SpeedSettings(speed=2.0)))

@@ -263,7 +263,12 @@ def test_one_compiled_loop_flies_them_all(monkeypatch: pytest.MonkeyPatch, tmp_p
 
     compiled: list[str] = []
     compile_text = native.compile_text
-    monkeypatch.setattr(native, "compile_text", lambda text: compiled.append(text) or compile_text(text))
+
+    def counted(text: str, quickly: bool) -> bytes:
+        compiled.append(text)
+        return compile_text(text, quickly)
+
+    monkeypatch.setattr(native, "compile_text", counted)
     monkeypatch.setenv("ROTORFAULT_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(cache, "_KEPT", {})
     monkeypatch.setattr(machine, "_LOADED", {})

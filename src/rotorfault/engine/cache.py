@@ -80,6 +80,14 @@ def get(name: str, make: Callable[[], Compiled]) -> Compiled:
     return _KEPT[name]
 
 
+def kept(name: str) -> bool:
+    """Whether a compiled loop of this name is in the process or on disk."""
+    if name in _KEPT:
+        return True
+    path = _path(name)
+    return path is not None and path.exists()
+
+
 class CacheWarning(UserWarning):
     """Compiled loops are not kept, because somebody else could have written where they lie."""
 

@@ -32,6 +32,7 @@ class Code:
         self.lines: list[str] = []
         self.counts: Counter[str] = Counter()
         self._names: dict[str, str] = {}
+        self._read: list[str] = []  # instructions of this block that read memory, or what such a one gave
         self._written = 0
 
     def value(self, instruction: str, sort: str | None = None) -> str:
@@ -41,6 +42,8 @@ class Code:
             name = self._names[instruction] = f"%{self._prefix}{self._written}"
             self._written += 1
             self.lines.append(f"  {name} = {instruction}")
+            if instruction.startswith(READING):
+                self._read.append(instruction)
             self.counts[sort or instruction.partition(" ")[0]] += 1
         return name
 
@@ -52,7 +55,9 @@ class Code:
         label = f"{self._prefix}b{self._written}"
         self._written += 1
         self.lines += [f"  br i1 {NEVER}, label %done, label %{label}", f"{label}:"]
-        self._names = {i: name for i, name in self._names.items() if not i.startswith(READING)}
+        for instruction in self._read:
+            del self._names[instruction]
+        self._read.clear()
 
     def constant(self, number: float) -> str:
         """A number in all lanes."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from rotorfault.base.versions import source_digest
 from rotorfault.engine import cache, native
-from rotorfault.engine.machine import aligned, compiled, loaded
+from rotorfault.engine.machine import Machine, aligned, loaded
 from rotorfault.engine.program import Layout, Program, Section, Traced, program
 from rotorfault.engine.trace import Tape
 from rotorfault.maths.arrays import Array
@@ -60,11 +60,13 @@ class Fold:
             records = (memory, inputs, parameters)
             shapes = repr([(leaf_names(one), statics(one)) for one in records])
             name = cache.digest_of("fold", source_digest(), native.compiler(), shapes, *words)
-        self._machine = loaded(name, lambda: compiled(made or written(), "the step"))
-        self._memory, lanes = memory, self._machine.lanes
-        numbers = np.array(flatten(parameters), dtype=float)
-        self._prepared = self._machine.prepare(_spread(numbers, lanes))
+        self._name, self._written = name, lambda: made or written()
+        self._memory, lanes = memory, native.lanes()
+        self._prepared = self._machine(0).prepare(_spread(np.array(flatten(parameters), dtype=float), lanes))
         self._state = _spread(np.array(flatten(memory), dtype=float), lanes)
+
+    def _machine(self, steps: int) -> Machine:
+        return loaded(self._name, self._written, "the step", steps)
 
     @property
     def memory(self) -> Any:
@@ -82,7 +84,7 @@ class Fold:
         -------
         ndarray, shape (steps, leaves of the output)
         """
-        machine = self._machine
+        machine = self._machine(len(rows))
         out = aligned((1, len(rows), machine.layout.signals, machine.lanes))
         machine.fly(self._state, self._prepared, np.ascontiguousarray(rows, dtype=float), out)
         return np.ascontiguousarray(out[0, :, :, 0])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple, final
 
@@ -14,9 +16,13 @@ from rotorfault.engine.cache import Compiled
 from rotorfault.engine.program import Program, program, same_for_all, trace
 from rotorfault.maths.arrays import Array
 
+# Steps of a group of lanes, each thread, that are flown by code that was made quickly: until then better code would
+# have cost as long to make as it would have saved, or longer (benchmarks/compile_effort.py).
+ENOUGH = 100_000
 _FUNCTIONS = (("prepare", 2, 1), ("fly", 4, 2))
 _NOTHING = np.zeros(1)
 _LOADED: dict[str, Machine] = {}
+_FLOWN: Counter[str] = Counter()  # steps, by name
 
 
 @final
@@ -64,45 +70,56 @@ class Machines(NamedTuple):
 
     batch: Batch
 
-    def get(self, with_signals: bool) -> Machine:
-        """The program with or without signals, compiled if it is not yet."""
+    def get(self, with_signals: bool, steps: float = math.inf) -> Machine:
+        """The program with or without signals, compiled if it is not yet.
+
+        Parameters
+        ----------
+        with_signals : bool
+        steps : float, optional
+            Of a group of lanes that each thread will fly with it.
+        """
         form = "recording" if with_signals else "quiet"
         name = cache.key(self.batch.loop, native.compiler(), f"{form} {same_for_all(self.batch)}")
         written: Program | None = None
         if name is None:
             written = self._written(with_signals)
             name = cache.key_of_program(written.text, native.compiler())
-        return loaded(name, lambda: compiled(written or self._written(with_signals), "the closed loop"))
+        return loaded(name, lambda: written or self._written(with_signals), "the closed loop", steps)
 
     def _written(self, with_signals: bool) -> Program:
         return program(trace(self.batch, same_for_all(self.batch)), native.lanes(), with_signals)
 
 
-def loaded(name: str, make: Callable[[], Compiled]) -> Machine:
-    """The machine of this name, loaded once; what it runs is made if it is not kept.
+def loaded(name: str, written: Callable[[], Program], what: str, steps: float) -> Machine:
+    """The machine of this name, loaded once; what it runs is compiled if it is not kept.
+
+    Few steps are flown by code that was made quickly, until they have become many (`ENOUGH`). No number depends on
+    which of the two it is.
 
     Parameters
     ----------
     name : str
-    make : callable
-        Compiles it.
+    written : callable
+        Writes the program.
+    what : str
+        It is of, for who waits.
+    steps : float
+        Of a group of lanes that each thread will fly.
     """
+    _FLOWN[name] += steps  # type: ignore[assignment]  # may be infinite
+    quickly = _FLOWN[name] <= ENOUGH and not cache.kept(name)
+    if quickly:
+        name = cache.digest_of(name, "made quickly")
     if name not in _LOADED:
-        _LOADED[name] = Machine(cache.get(name, make))
+        _LOADED[name] = Machine(cache.get(name, lambda: _compiled(written(), what, quickly)))
     return _LOADED[name]
 
 
-def compiled(written: Program, what: str) -> Compiled:
-    """The object code of a program.
-
-    Parameters
-    ----------
-    written : Program
-    what : str
-        It is of, for who waits.
-    """
+def _compiled(written: Program, what: str, quickly: bool) -> Compiled:
     with Busy(f"compiling {what} (once for its parts, then kept)"):
-        return Compiled(native.compile_text(written.text), written.layout, dict(written.operations))
+        code = native.compile_text(written.text, quickly)
+        return Compiled(code, written.layout, dict(written.operations))
 
 
 def aligned(shape: tuple[int, ...]) -> Array:

@@ -27,18 +27,28 @@ def compiler() -> str:
     return f"LLVM {version} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
-@lru_cache(maxsize=1)
-def _machine() -> Any:
+@lru_cache(maxsize=2)
+def _machine(quickly: bool = False) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=3, jit=True
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=0 if quickly else 3,
+        jit=True,
     )
 
 
-def compile_text(text: str) -> bytes:
-    """Object code of a module."""
-    return bytes(_machine().emit_object(_module(text)))
+def compile_text(text: str, quickly: bool = False) -> bytes:
+    """Object code of a module; of code that is made quickly the numbers are the same to the last bit.
+
+    Parameters
+    ----------
+    text : str
+    quickly : bool, optional
+        Whether little time is spent on the choice and order of instructions and on registers.
+    """
+    return bytes(_machine(quickly).emit_object(_module(text)))
 
 
 def assembly_of(text: str) -> str:

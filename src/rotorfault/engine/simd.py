@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rotorfault.engine.batch import CHUNK, Batch, Recording, Records, Watch, columns, ends_of, no_watch
 from rotorfault.engine.machine import Machine, Machines, aligned, grouped, ungrouped
+from rotorfault.engine.native import lanes
 from rotorfault.maths.arrays import Array
 
 GROUPS = 8  # of lanes in a block: enough for calls to cost nothing, few enough for the cache
@@ -75,8 +76,9 @@ class _Common:
     def __init__(self, batch: Batch, threads: int) -> None:
         machines = Machines(batch)
         self.batch = batch
-        self.quiet = machines.get(with_signals=False) if batch.every != 1 else None
-        self.recording = machines.get(with_signals=True) if batch.every != 0 else None
+        steps = batch.steps * -(-batch.flights // (lanes() * threads))
+        self.quiet = machines.get(False, steps) if batch.every != 1 else None
+        self.recording = machines.get(True, steps / batch.every) if batch.every != 0 else None
         any_machine = self.quiet or self.recording
         assert any_machine is not None
         self.layout, self.lanes = any_machine.layout, any_machine.lanes

@@ -12,6 +12,7 @@ controller that shall run in every engine is a block in the scalar style instead
 from __future__ import annotations
 
 import traceback
+from collections.abc import Mapping, Set
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from pydantic_core import PydanticCustomError
@@ -151,6 +152,11 @@ def as_controller(given: Any) -> Controller[Any, Any]:
         raise InputError(f"controller {given.__name__} is a class; hand in an object: {given.__name__}()")
     if isinstance(given, Controller):
         return given
+    if isinstance(given, (Mapping, Set)):  # their update is another
+        raise InputError(
+            f"controller is a {type(given).__name__}; settings of a flight are given as settings={{...}}, a "
+            "controller is a name or an object"
+        )
     if callable(getattr(given, "update", None)):
         return PythonController(given)
     raise InputError(
