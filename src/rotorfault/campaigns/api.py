@@ -65,6 +65,7 @@ class Campaign:
         self.folder = Path(folder)
         self._store = Store.open(self.folder)
         self.study: Study = study_from(self._store.study, str(self.folder / "study.json"), allow_code)
+        self._summaries: dict[int, Summary | None] = {}  # by flights: one takes a minute where detectors are many
 
     def __repr__(self) -> str:
         return cut(f"<campaign {cut(self.study.name)} in {self.folder}>", LONGEST)
@@ -109,7 +110,10 @@ class Campaign:
 
     def summary(self) -> Summary | None:
         """What its study writes besides table and maps, from the flights there are; None where it writes nothing."""
-        return summary_of(self.study, self._store.table())
+        table = self._store.table()
+        if table.num_rows not in self._summaries:
+            self._summaries = {table.num_rows: summary_of(self.study, table)}
+        return self._summaries[table.num_rows]
 
     def report(self) -> list[Path]:
         """Write pictures and page, and what its study writes besides; the page's path first."""
@@ -118,7 +122,7 @@ class Campaign:
 
         made_by = {**self._store.identity.versions, "source": self._store.identity.program}
         self.write_summary()
-        return write(self.study, self._store.table(), self.folder, made_by)
+        return write(self.study, self._store.table(), self.folder, made_by, self.summary())
 
     def write_summary(self) -> list[Path]:
         """Write the files of the study's summary anew, if it has one; their paths."""

@@ -11,6 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
+from rotorfault.base.collector import no_collection
 from rotorfault.base.versions import source_digest
 from rotorfault.engine import cache, native
 from rotorfault.engine.machine import Machine, aligned, loaded
@@ -50,7 +51,8 @@ class Fold:
         self, step: Step, memory: Any, inputs: Any, parameters: Any, words: Sequence[str] | None = None
     ) -> None:
         def written() -> Program:
-            return _program(step, memory, inputs, parameters)
+            with no_collection():
+                return _program(step, memory, inputs, parameters)
 
         made: Program | None = None
         if words is None:

@@ -9,6 +9,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from rotorfault.base.collector import no_collection
 from rotorfault.base.progress import Busy
 from rotorfault.engine import cache, native
 from rotorfault.engine.batch import Batch
@@ -88,7 +89,8 @@ class Machines(NamedTuple):
         return loaded(name, lambda: written or self._written(with_signals), "the closed loop", steps)
 
     def _written(self, with_signals: bool) -> Program:
-        return program(trace(self.batch, same_for_all(self.batch)), native.lanes(), with_signals)
+        with no_collection():
+            return program(trace(self.batch, same_for_all(self.batch)), native.lanes(), with_signals)
 
 
 def loaded(name: str, written: Callable[[], Program], what: str, steps: float) -> Machine:

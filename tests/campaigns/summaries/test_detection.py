@@ -333,3 +333,15 @@ def test_each_detector_flies_with_speeds_and_without() -> None:
     kinds = [one.diagnosis.kind for one in flown]
     assert len(set(kinds)) == 4
     assert {kinds.count(kind) for kind in kinds} == {4}
+
+
+@needs_simd
+def test_its_page_does_not_ask_whether_hover_can_be_controlled(flown: Path) -> None:
+    """That bounds what flights survive, and takes minutes where a study has many cases."""
+    done = rotorfault.Campaign(flown)
+    assert all(variant.possible is None for variant in done.maps().variants)
+    done.report()
+    page = (flown / "report.html").read_text(encoding="utf-8")
+    assert "Faults found" in page
+    assert "hover controlled" not in page
+    assert "hover can be controlled" not in page

@@ -161,8 +161,11 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
 
 def _numbers(maps: Maps, variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
     flights, successes = int(variant.flights[at]), int(variant.successes[at])
+    hover: tuple[str, ...] = ()
+    if maps.study.grading == "flight":
+        hover = (f"hover can be controlled: {possible_text(variant.possible, at)}",)
     if not flights:
-        return ("no flights", f"hover can be controlled: {possible_text(variant.possible, at)}")
+        return ("no flights", *hover)
     names = GRADINGS[maps.study.grading].names
     grades = ", ".join(f"{name} {n}" for name, n in zip(names, _of(variant.grades, at), strict=True) if n)
     return (
@@ -171,7 +174,7 @@ def _numbers(maps: Maps, variant: VariantMap, at: tuple[int, ...]) -> tuple[str,
         grades,
         f"recovery time: {_quantiles(_of(variant.recovery, at), 's', 'never')}",
         f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'failed')}",
-        f"hover can be controlled: {possible_text(variant.possible, at)}",
+        *hover,
     )
 
 

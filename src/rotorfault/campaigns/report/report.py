@@ -14,13 +14,15 @@ from rotorfault.campaigns.report.page import render
 from rotorfault.campaigns.report.summary_figures import summary_figures
 from rotorfault.campaigns.store.folder import PAGE
 from rotorfault.campaigns.study import Study
-from rotorfault.campaigns.summaries import summary_of
+from rotorfault.campaigns.summaries.parts import Summary
 from rotorfault.report.figures import save
 
 FIGURES = "figures"
 
 
-def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, str]) -> list[Path]:
+def write(
+    study: Study, table: pa.Table, folder: Path, versions: Mapping[str, str], summary: Summary | None = None
+) -> list[Path]:
     """Draw the figures of a campaign and write its page, from its table.
 
     Parameters
@@ -32,6 +34,8 @@ def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, st
         Of the campaign.
     versions : mapping of str to str
         With which it was flown; under ``source`` the digest of the program's source.
+    summary : Summary, optional
+        What the study writes besides, from the same table.
 
     Returns
     -------
@@ -43,7 +47,7 @@ def write(study: Study, table: pa.Table, folder: Path, versions: Mapping[str, st
     InputError
         If no cell has a whole round yet, or the folder cannot be written.
     """
-    numbers, summary = maps(study, table), summary_of(study, table)
+    numbers = maps(study, table)
     drawn = {} if summary is None else summary_figures(summary)
     figures = save({**draw(numbers), **drawn}, folder / FIGURES, ("png", "svg"))
     shown = {path.stem: path for path in figures if path.suffix == ".svg" and path.stem in ("grades", "recovery")}
