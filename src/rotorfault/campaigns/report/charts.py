@@ -32,7 +32,7 @@ from rotorfault.campaigns.report.axis_drawing import (
 from rotorfault.campaigns.report.curves import LEVELS, Crossings, Slice, crossings, edges
 from rotorfault.campaigns.report.flown import command, place_text, variant_option
 from rotorfault.campaigns.report.kept import example, link
-from rotorfault.campaigns.report.limits import Limits
+from rotorfault.campaigns.report.limits import possible_text
 from rotorfault.campaigns.report.maps import Maps, Pairing, VariantMap, View
 from rotorfault.campaigns.sampling.statistics import Array
 from rotorfault.report.style import BLACK, VERMILION
@@ -204,15 +204,6 @@ def _replay(variant: VariantMap, at: tuple[int, ...], folder: Path) -> tuple[tup
         return (again,), f"the first of {failures} flights that failed"
     again = command(folder, f"--cell {variant.cell[at]} {variant_option(variant.label)}")
     return (again,), "the first flight; none failed" if variant.flights[at] else "the flight that would be first"
-
-
-def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
-    """Whether hover can be controlled, in words."""
-    if possible is None:
-        return "not known"
-    words = {1.0: "yes", 0.0: "no"}
-    held, free = (words.get(float(each[at]), "depends on what is drawn") for each in possible)
-    return held if held == free else f"with yaw held {held}, given up {free}"
 
 
 def percent(share: float) -> str:

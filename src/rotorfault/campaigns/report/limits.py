@@ -58,6 +58,22 @@ class Physics(NamedTuple):
     wind_W: Vec3  # m/s, mean
 
 
+def possible_text(possible: Limits | None, at: tuple[int, ...]) -> str:
+    """Whether hover can be controlled, in words.
+
+    Parameters
+    ----------
+    possible : Limits or None
+    at : tuple of int
+        Place in their arrays.
+    """
+    if possible is None:
+        return "not known"
+    words = {1.0: "yes", 0.0: "no"}
+    held, free = (words.get(float(each[at]), "depends on what is drawn") for each in possible)
+    return held if held == free else f"with yaw held {held}, given up {free}"
+
+
 def limits(study: Study, variant: int, values: Mapping[str, NDArray[Any]], *, middle: bool = False) -> Limits | None:
     """Whether hover can be controlled at some values of a study's axes.
 
