@@ -32,6 +32,7 @@ ROWS = {
     "hitsz": ("hitsz: 1", "hitsz: 1 and 2"),
     "x500": ("x500: 1",),
 }
+TUMBLES = {"deadcat": ("deadcat: 1",)}  # until it spins: no row of the claim, flown where it is asked for
 NEAR_A_LIMIT = ("hummingbird: 1", "hummingbird: 3", "hummingbird: 1 and 2", "x500: 1")
 OTHERS = ("smc", "indi", "lqr_relaxed_hover", "uniform_passive", "mocap", "gps-consumer")
 
@@ -88,14 +89,14 @@ def main() -> None:
     """Fly and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=1000)
-    parser.add_argument("--only", nargs="+", choices=ROWS, default=list(ROWS))
+    parser.add_argument("--only", nargs="+", choices=ROWS | TUMBLES, default=list(ROWS))
     parser.add_argument("--json", type=Path)
     parser.add_argument("--others", action="store_true", help="cases of other laws and of real sensors")
     parser.add_argument("--drawn", action="store_true", help="mass and direction of the wind drawn")
     chosen = parser.parse_args()
     known, rows = cases(), []
     others = [label for label in known if label.endswith(OTHERS)]
-    labels = others if chosen.others else [label for vehicle in chosen.only for label in ROWS[vehicle]]
+    labels = others if chosen.others else [label for vehicle in chosen.only for label in (ROWS | TUMBLES)[vehicle]]
     labels = list(NEAR_A_LIMIT) if chosen.drawn else labels
     print("| lost | wind [m/s] | up | within 2 m | interval [%] | height lost [m]: median, 95 % |\n|" + " --- |" * 6)
     for label in labels:

@@ -27,6 +27,7 @@ DETECTION = Grading(
         "lost": "the flight was over before its fault began",
     },
     "A flag counts from the onset of the fault to the end of the flight.",
+    hover_bounds=False,
 )
 
 

@@ -46,6 +46,7 @@ class Grading(NamedTuple):
     success: tuple[str, ...]  # unless the study says otherwise
     meanings: dict[str, str]  # of each grade, in order
     about: str  # of all of them
+    hover_bounds: bool  # whether where hover can be controlled bounds where flights succeed
 
     def __repr__(self) -> str:
         return record_line(self)
@@ -70,6 +71,7 @@ FLIGHT = Grading(
         "lost": "tumbled, upside down in the air for half a second, or diverged: a state not finite or 10 km away",
     },
     "Numbers are taken over the last half of a flight.",
+    hover_bounds=True,
 )
 
 

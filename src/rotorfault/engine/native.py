@@ -28,7 +28,7 @@ def compiler() -> str:
 
 
 @lru_cache(maxsize=2)
-def _machine(quickly: bool = False) -> Any:
+def _machine(quickly: bool) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple().create_target_machine(
@@ -53,11 +53,11 @@ def compile_text(text: str, quickly: bool = False) -> bytes:
 
 def assembly_of(text: str) -> str:
     """What `compile_text` makes of a module, to be read."""
-    return str(_machine().emit_assembly(_module(text)))
+    return str(_machine(False).emit_assembly(_module(text)))
 
 
 def _module(text: str) -> Any:
-    module = llvm.parse_assembly(f'target triple = "{_machine().triple}"\n{text}')
+    module = llvm.parse_assembly(f'target triple = "{_machine(False).triple}"\n{text}')
     module.verify()
     return module
 
@@ -72,7 +72,7 @@ class Native:
     """
 
     def __init__(self, code: bytes, functions: Sequence[tuple[str, int, int]]) -> None:
-        _machine()
+        _machine(False)
         self._jit = llvm.create_lljit_compiler()
         names = [name for name, _, _ in functions]
         builder = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()

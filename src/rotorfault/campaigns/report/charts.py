@@ -161,20 +161,18 @@ def difference_lines_chart(maps: Maps, k: int, cells: NDArray[np.object_]) -> Sp
 
 def _numbers(maps: Maps, variant: VariantMap, at: tuple[int, ...]) -> tuple[str, ...]:
     flights, successes = int(variant.flights[at]), int(variant.successes[at])
-    hover: tuple[str, ...] = ()
-    if maps.study.grading == "flight":
-        hover = (f"hover can be controlled: {possible_text(variant.possible, at)}",)
+    grading, hover = GRADINGS[maps.study.grading], f"hover can be controlled: {possible_text(variant.possible, at)}"
+    bounds = (hover,) if grading.hover_bounds else ()
     if not flights:
-        return ("no flights", *hover)
-    names = GRADINGS[maps.study.grading].names
-    grades = ", ".join(f"{name} {n}" for name, n in zip(names, _of(variant.grades, at), strict=True) if n)
+        return ("no flights", *bounds)
+    grades = ", ".join(f"{name} {n}" for name, n in zip(grading.names, _of(variant.grades, at), strict=True) if n)
     return (
         f"success {successes} of {flights}: {percent(variant.success_rate[at])} "
         f"({percent(variant.lower[at])} to {percent(variant.upper[at])})",
         grades,
         f"recovery time: {_quantiles(_of(variant.recovery, at), 's', 'never')}",
         f"altitude lost: {_quantiles(_of(variant.altitude, at), 'm', 'failed')}",
-        *hover,
+        *bounds,
     )
 
 

@@ -245,9 +245,8 @@ def _variant(study: Study, k: int, sample: _Sample, cell: Counts, common: NDArra
         for values in (recovery, altitude)
         for weights, groups, n, form in ((alike, place, count, shape), (weight, along, rows, (rows,)))
     ]
-    # Whether hover can be controlled bounds flights, not what a detector can tell.
-    flown = study.grading == "flight"
-    possible = limits(study, k, study.cell_values(cell.ravel())) if flown else None
+    bounded = GRADINGS[study.grading].hover_bounds
+    possible = limits(study, k, study.cell_values(cell.ravel())) if bounded else None
     return VariantMap(
         label=study.variant[k].label,
         cell=cell,
