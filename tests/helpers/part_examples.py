@@ -44,7 +44,7 @@ def _value(kind: Any, metadata: list[Any], folder: Path, rising: Iterator[int]) 
         count = 1 if inner[-1] is Ellipsis else len(inner)
         return [_value(inner[0], [], folder, rising) for _ in range(count)]
     if kind is float:
-        return _within(0.05 * next(rising), metadata)
+        return _within(0.02 * next(rising), metadata)
     if kind is int:
         return int(_within(1, metadata))
     if kind is str:

@@ -32,7 +32,7 @@ from rotorfault.scenario.slots import SLOTS
 
 Array = NDArray[np.float64]
 Parts = dict[str, str]  # name of a part by that of its slot
-STEPS = 110  # of 2 ms: more than half of them after the faults of the parts
+STEPS = 50  # of 2 ms: more than half of them after the faults of the parts
 EVERYWHERE = max(len(slot.registry) for slot in SLOTS)
 
 
@@ -53,7 +53,7 @@ each_flight = pytest.mark.parametrize("parts", covering(), ids=["-".join(parts.v
 
 
 def scenario(folder: Path, parts: Parts) -> Scenario:
-    """A flight of 0.22 s, away from rest and from the ground, with these parts, and the defaults in other slots."""
+    """A flight of 0.1 s, away from rest and from the ground, with these parts, and the defaults in other slots."""
     tables: dict[str, Any] = {
         "name": "conformance",
         "vehicle": "paper",
