@@ -96,7 +96,7 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         if turns is not None:
             fresh = fresh * (1.0 - turns.doubt)
         flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
-        still = verdict.still_faulty(mean, variance, p.least)
+        still = verdict.still_faulty(mean, variance, p.least).map(maximum, memory.following.stands)
         flags, _ = verdict.held(flags, new, still, p.clear_persistence, dt)
 
         among = verdict.fewest(fresh).map(maximum, flags.flagged)

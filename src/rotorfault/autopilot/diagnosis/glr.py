@@ -213,7 +213,7 @@ def found_and_followed(
     new = new * (1.0 - flagged)  # the filter follows a change by itself
     belief = jumps.believe(model.belief, looked, found, new)
     windows = jumps.begun_anew(windows, 1.0 - (new.sum() if turns is None else maximum(new.sum(), step.begun)))
-    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
+    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, memory.following.stands, inputs, p, dt)
     any_flag = flags.flagged.reduce(maximum)
     slow = slow_losses.begun_anew(slow, belief, any_flag)
     model = model._replace(gusts=turning_gusts.beside_a_loss(model.gusts, any_flag))
@@ -235,6 +235,7 @@ def conclude(
     new: PerRotor,
     fresh: PerRotor,
     found: jumps.Best,
+    stands: PerRotor,
     inputs: DiagnosisInputs,
     parameters: GlrParameters,
     dt: Scalar,
@@ -252,6 +253,8 @@ def conclude(
         Probability of a new fault.
     found : Best
         What windows say of rotors that are not flagged.
+    stands : PerRotor
+        1 where a rotor is believed stuck: its loss says nothing then.
     inputs : DiagnosisInputs
     parameters : GlrParameters
     dt : scalar, s
@@ -260,7 +263,7 @@ def conclude(
     p, rotors = parameters, inputs.vehicle.rotors
     mean = PerRotor.of(belief.mean[LOSSES : LOSSES + rotors])
     variance = PerRotor.of(belief.of(LOSSES + i, LOSSES + i) for i in range(rotors))
-    still = verdict.still_faulty(mean, variance, p.least)
+    still = verdict.still_faulty(mean, variance, p.least).map(maximum, stands)
     flags, cleared = verdict.held(memory, new, still, p.clear_persistence, dt)
     belief = forgotten(belief, cleared)
     flagged = flags.flagged
