@@ -213,7 +213,8 @@ def found_and_followed(
     new = new * (1.0 - flagged)  # the filter follows a change by itself
     belief = jumps.believe(model.belief, looked, found, new)
     windows = jumps.begun_anew(windows, 1.0 - (new.sum() if turns is None else maximum(new.sum(), step.begun)))
-    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, memory.following.stands, inputs, p, dt)
+    held = memory.following.stands if turns is None else standing.unread(memory.following.stands, turns)
+    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, held, inputs, p, dt)
     any_flag = flags.flagged.reduce(maximum)
     slow = slow_losses.begun_anew(slow, belief, any_flag)
     model = model._replace(gusts=turning_gusts.beside_a_loss(model.gusts, any_flag))
@@ -224,8 +225,8 @@ def found_and_followed(
         stands = standing.stands(stands, turns)
     after = GlrMemory(model._replace(belief=belief), windows, slow, flags, judged)
     among = verdict.fewest(fresh).map(maximum, flags.flagged)
-    held = diagnosis.stuck.thrust
-    shown = diagnosis.probability, found.excess, among, stands, held, p.threshold, model.gusts.share
+    given = diagnosis.stuck.thrust
+    shown = diagnosis.probability, found.excess, among, stands, given, p.threshold, model.gusts.share
     return after, diagnosis, GlrSignals(*shown)
 
 
