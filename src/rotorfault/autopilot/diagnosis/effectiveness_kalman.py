@@ -96,8 +96,7 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         if turns is not None:
             fresh = fresh * (1.0 - turns.doubt)
         flags, new = verdict.newly(memory.verdict, fresh, p.persistence, dt)
-        held = memory.following.stands if turns is None else standing.unread(memory.following.stands, turns)
-        still = verdict.still_faulty(mean, variance, p.least).map(maximum, held)
+        still = verdict.still_faulty(mean, variance, p.least)
         flags, _ = verdict.held(flags, new, still, p.clear_persistence, dt)
 
         among = verdict.fewest(fresh).map(maximum, flags.flagged)
@@ -112,5 +111,6 @@ class EffectivenessKalman(Diagnoser[EffectivenessMemory, EffectivenessParameters
         if turns is not None:
             diagnosis = standing.told(diagnosis, turns, inputs.expectation.thrust, inputs.vehicle)
             stands = standing.stands(stands, turns)
-        shown = diagnosis.probability, excess, among, stands, diagnosis.stuck.thrust, p.threshold, model.gusts.share
-        return EffectivenessMemory(model, flags, judged), diagnosis, GlrSignals(*shown)
+        after, held = EffectivenessMemory(model, flags, judged), diagnosis.stuck.thrust
+        shown = diagnosis.probability, excess, among, stands, held, p.threshold, model.gusts.share
+        return after, diagnosis, GlrSignals(*shown)

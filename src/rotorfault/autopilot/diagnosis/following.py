@@ -17,10 +17,6 @@ likelihood ratio
 
 and what is stuck has the probability :math:`1/(1 + e^{-\ln\Lambda})` beside the loss. It is believed once that is
 `rotorfault.autopilot.diagnosis.verdict.RAISE`, and what the loss misses is worth a belief.
-
-**How long.** A stuck rotor is told what would be right if it were not, and that is often about what it gives: then
-both explain all, and nothing is learned. So the means stand still while the thrust of a sound rotor is as near to
-that of a rotor believed stuck as a belief is worth, and the flag of a rotor that is believed stuck is not taken back.
 """
 
 from __future__ import annotations
@@ -32,7 +28,6 @@ from rotorfault.autopilot.diagnosis.fault_free import LOSSES, ModelParameters
 from rotorfault.autopilot.diagnosis.kalman import Belief
 from rotorfault.autopilot.diagnosis.protocol import DiagnosisInputs
 from rotorfault.autopilot.diagnosis.stuck import (
-    MANY,
     WINDOW,
     Seen,
     StuckMemory,
@@ -43,8 +38,7 @@ from rotorfault.autopilot.diagnosis.stuck import (
 )
 from rotorfault.autopilot.diagnosis.verdict import MOST, RAISE
 from rotorfault.maths.geometry import PerRotor
-from rotorfault.maths.records import select_record
-from rotorfault.maths.scalar import Scalar, absolute, both, exp, greater_equal, less, maximum, minimum, select
+from rotorfault.maths.scalar import Scalar, both, exp, greater_equal, maximum, minimum
 from rotorfault.model.block import Context
 from rotorfault.model.effectiveness import effectiveness
 from rotorfault.model.mixer import hover_thrust
@@ -146,17 +140,13 @@ def follows(
     none = PerRotor.all(0.0, rotors)
     hover = hover_thrust(vehicle).sum() / rotors
     seen = Seen(thrust, -(mean * thrust * flagged), none, none, flagged)
-    judged_now, stuck = judged(memory.judged, seen, 0.0, hover, p.stuck, dt)
-    which = judged_now.judged
-    away = (which * thrust).sum() - memory.judged.given
-    nothing = both((which * memory.stands).sum(), less(absolute(away), WORTH * hover))
-    after = select_record(nothing, memory.judged._replace(judged=which, since=judged_now.since), judged_now)
+    after, stuck = judged(memory.judged, seen, 0.0, hover, p.stuck, dt)
 
+    which = after.judged
     noise = (which * variance * thrust * thrust).sum()
     missed = maximum(missed_by(after, p.stuck.missed * hover), 0.0)
     ratio = missed * (WINDOW / (2.0 * p.lateness)) / maximum(noise, 1e-9 * hover * hover)
     probable = 1.0 / (1.0 + exp(-minimum(ratio, MOST)))
     sure = greater_equal(probable, RAISE)
-    believed = which * both(sure, select(nothing, less(flagged.sum(), MANY), stuck.rotor.reduce(maximum)))
-    held = maximum(after.given, 0.0)
-    return FollowingMemory(thrust, after, believed), Stuck(believed, believed * held), which * probable
+    rotor = stuck.rotor.map(lambda on: both(on, sure))
+    return FollowingMemory(thrust, after, rotor), Stuck(rotor, stuck.thrust * rotor), which * probable

@@ -213,8 +213,7 @@ def found_and_followed(
     new = new * (1.0 - flagged)  # the filter follows a change by itself
     belief = jumps.believe(model.belief, looked, found, new)
     windows = jumps.begun_anew(windows, 1.0 - (new.sum() if turns is None else maximum(new.sum(), step.begun)))
-    held = memory.following.stands if turns is None else standing.unread(memory.following.stands, turns)
-    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, held, inputs, p, dt)
+    flags, diagnosis, belief = conclude(flags, belief, new, fresh, found, inputs, p, dt)
     any_flag = flags.flagged.reduce(maximum)
     slow = slow_losses.begun_anew(slow, belief, any_flag)
     model = model._replace(gusts=turning_gusts.beside_a_loss(model.gusts, any_flag))
@@ -225,8 +224,8 @@ def found_and_followed(
         stands = standing.stands(stands, turns)
     after = GlrMemory(model._replace(belief=belief), windows, slow, flags, judged)
     among = verdict.fewest(fresh).map(maximum, flags.flagged)
-    given = diagnosis.stuck.thrust
-    shown = diagnosis.probability, found.excess, among, stands, given, p.threshold, model.gusts.share
+    held = diagnosis.stuck.thrust
+    shown = diagnosis.probability, found.excess, among, stands, held, p.threshold, model.gusts.share
     return after, diagnosis, GlrSignals(*shown)
 
 
@@ -236,7 +235,6 @@ def conclude(
     new: PerRotor,
     fresh: PerRotor,
     found: jumps.Best,
-    stands: PerRotor,
     inputs: DiagnosisInputs,
     parameters: GlrParameters,
     dt: Scalar,
@@ -254,8 +252,6 @@ def conclude(
         Probability of a new fault.
     found : Best
         What windows say of rotors that are not flagged.
-    stands : PerRotor
-        1 where a rotor is believed stuck: its loss says nothing then.
     inputs : DiagnosisInputs
     parameters : GlrParameters
     dt : scalar, s
@@ -264,7 +260,7 @@ def conclude(
     p, rotors = parameters, inputs.vehicle.rotors
     mean = PerRotor.of(belief.mean[LOSSES : LOSSES + rotors])
     variance = PerRotor.of(belief.of(LOSSES + i, LOSSES + i) for i in range(rotors))
-    still = verdict.still_faulty(mean, variance, p.least).map(maximum, stands)
+    still = verdict.still_faulty(mean, variance, p.least)
     flags, cleared = verdict.held(memory, new, still, p.clear_persistence, dt)
     belief = forgotten(belief, cleared)
     flagged = flags.flagged

@@ -323,7 +323,9 @@ def told(diagnosis: Diagnosis, memory: Standing, thrust: PerRotor, vehicle: Vehi
     def of_it(mine: PerRotor, other: PerRotor) -> PerRotor:
         return on.map(select, mine, other)
 
-    moved = Stuck(*(unread(one, memory) for one in diagnosis.stuck))
+    # The motion takes a rotor that has lost nearly all for one that gives nothing at any command.
+    unread = less(memory.read, 0.5)
+    moved = Stuck(diagnosis.stuck.rotor * unread, diagnosis.stuck.thrust * unread)
     stuck = Stuck(moved.rotor.map(maximum, on), of_it(memory.thrust, moved.thrust))
     return diagnosis._replace(
         loss=of_it(missing, diagnosis.loss),
@@ -343,19 +345,5 @@ def stands(probability: PerRotor, memory: Standing) -> PerRotor:
         By the motion alone.
     memory : Standing
     """
-    both: PerRotor = unread(probability, memory).map(maximum, memory.probability)
+    both: PerRotor = (probability * less(memory.read, 0.5)).map(maximum, memory.probability)
     return both
-
-
-def unread(of_motion: PerRotor, memory: Standing) -> PerRotor:
-    """What the motion says of rotors that do not follow: nothing while speeds are read.
-
-    The motion takes a rotor that has lost nearly all for one that gives nothing at any command.
-
-    Parameters
-    ----------
-    of_motion : PerRotor
-    memory : Standing
-    """
-    of_it: PerRotor = of_motion * less(memory.read, 0.5)
-    return of_it

@@ -35,7 +35,6 @@ from rotorfault.maths.scalar import Scalar, both, clip, either, greater_equal, l
 from rotorfault.model.signals import Stuck
 
 WINDOW = 0.2  # s: time constant of the means; as long as a fault takes to be cleared
-MANY = 2.5  # flagged rotors: from three on no two are sound, and what a rotor gives is not known
 
 
 class StuckParameters(NamedTuple):
@@ -113,7 +112,7 @@ def judged(
     after = StuckMemory(which, since, given, product, square)
     missed = missed_by(after, bar)
     bar = bar * bar
-    known = less(seen.flagged.sum(), MANY)
+    known = less(seen.flagged.sum(), 2.5)
     is_stuck = both(both(settled, known), less(bar, missed))
     stuck = which.map(lambda it: both(it, is_stuck))
     held = maximum(given, 0.0)
