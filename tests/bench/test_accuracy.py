@@ -41,8 +41,13 @@ def short(substeps: int = 1, **tables: Any) -> Scenario:
 
 @pytest.mark.parametrize(
     "tables",
-    [{}, {"wind": "paper"}, {"wind": GUSTS}, {"plant": "paper_model"}, {"sensors": "noisy"}],
-    ids=["constant", "paper", "gusts", "paper_model", "noisy"],
+    [
+        pytest.param({}, id="constant"),
+        pytest.param({"wind": "paper"}, id="paper", marks=pytest.mark.long),
+        pytest.param({"wind": GUSTS}, id="gusts"),
+        pytest.param({"plant": "paper_model"}, id="paper_model", marks=pytest.mark.long),
+        pytest.param({"sensors": "noisy"}, id="noisy", marks=pytest.mark.long),
+    ],
 )
 def test_the_closed_loop_is_of_fourth_order_against_taylor_series(tables: dict[str, Any]) -> None:
     truth = taylor(assemble(short(**tables)))

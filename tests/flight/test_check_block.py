@@ -49,8 +49,8 @@ BROKEN: list[tuple[type[Any], str, str]] = [
 
 @pytest.fixture(autouse=True)
 def shorter(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a part here does wrong, it has done after 0.2 s."""
-    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 110)
+    """What a part here does wrong, it has done after 0.15 s."""
+    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 75)
 
 
 @cache

@@ -116,7 +116,7 @@ class OwnState(Good):
 
     def step(self, memory: rf.Nothing, inputs: rf.TimeInputs, parameters: Speed, dt: Scalar) -> Any:
         self.asked += 1
-        speed = parameters.speed * select(greater(inputs.time, 0.2), float(self.asked), 1.0)
+        speed = parameters.speed * select(greater(inputs.time, 0.12), float(self.asked), 1.0)
         return memory, blowing(speed), rf.Nothing()
 
 

@@ -66,7 +66,8 @@ def flown(name: str, value: float) -> rf.Flight:
 
 
 @every_part
-def test_an_example_keeps_the_rules_of_a_part(name: str) -> None:
+def test_an_example_keeps_the_rules_of_a_part(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 50)
     assert rf.check_block(place(name)).kept
 
 

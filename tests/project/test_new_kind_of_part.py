@@ -351,7 +351,8 @@ def test_the_catalogue_lists_it() -> None:
         assert "Watches nothing" in listed.output
 
 
-def test_it_keeps_the_rules_of_parts_or_is_told_which_it_breaks() -> None:
+def test_it_keeps_the_rules_of_parts_or_is_told_which_it_breaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rotorfault.flight.rules.STEPS", 50)
     report = rotorfault.check_block(Smooth)
     assert report.kept
     assert str(report).startswith("monitor Smooth\n")
