@@ -79,6 +79,7 @@ def midsize(vehicle: str, law: str) -> dict[str, object]:
     return {"vehicle": vehicle, "controller.kind": law, "controller.preset": "midsize"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["roismc", "smc"])
 def test_midsize_has_the_usual_margins_on_every_vehicle_of_its_rotors(law: str) -> None:
     """Those that it was not made from as well: their inertia, arms and numbers of rotors are not in the gains."""
@@ -90,6 +91,7 @@ def test_midsize_has_the_usual_margins_on_every_vehicle_of_its_rotors(law: str) 
 
 
 @needs_simd
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["roismc", "smc"])
 @pytest.mark.parametrize("vehicle", [*KEPT_ASIDE, "x500"])
 def test_midsize_flies_what_it_was_not_made_from(vehicle: str, law: str) -> None:

@@ -25,6 +25,7 @@ def log() -> Log:
     return level(log_of(flown(seed=2, rotor=1, loss=0.5, seconds=12.0, onset=9.0, noise=0.002)))
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not have_simd(), reason="llvmlite is not installed")
 def test_compiled_it_says_what_it_says_step_by_step(log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     hover = hover_of(log, SPANS)

@@ -13,7 +13,7 @@ from browsers import NEEDED, Opened, chromium
 import rotorfault as rf
 from rotorfault.base.plain_text import one_line
 
-pytestmark = NEEDED
+pytestmark = [NEEDED, pytest.mark.long]
 
 
 @pytest.fixture(scope="module")

@@ -162,6 +162,7 @@ def drives(batch: Batch) -> list[list[float]]:
 
 
 @each_flight
+@pytest.mark.long
 def test_traced_in_casadi_it_gives_the_same_numbers(parts: Parts, tmp_path: Path) -> None:
     """And no number of the settings is baked in: other settings' parameters, in the same trace, give their flight."""
     casadi = pytest.importorskip("casadi")
