@@ -105,7 +105,8 @@ def main() -> None:
     """Fly, draw and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=100, help="of each law in each cell")
-    parser.add_argument("--only", nargs="+", default=["paper", "hummingbird", "crazyflie-2.1", "x500"])
+    first = ["paper", "hummingbird", "crazyflie-2.1", "x500"]
+    parser.add_argument("--only", nargs="+", choices=cases(), default=first, metavar="VEHICLE")
     parser.add_argument("--out", type=Path, default=Path("results/loss-maps"))
     chosen = parser.parse_args()
     panels: list[Panel] = []

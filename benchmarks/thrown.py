@@ -75,9 +75,9 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=100)
     parser.add_argument("--height", type=float, default=10.0, help="m")
     parser.add_argument("--seed", type=int, default=SEED, help="of the throws and their gusts")
-    parser.add_argument("--only", nargs="+", default=list(LABELS))
-    chosen = parser.parse_args()
     known = cases()
+    parser.add_argument("--only", nargs="+", choices=known, default=list(LABELS), metavar="LABEL")
+    chosen = parser.parse_args()
     print(f"| lost | {' | '.join(DIAGNOSES)} | no law below |\n|" + " --- |" * (2 + len(DIAGNOSES)))
     for label in chosen.only:
         cells = []
